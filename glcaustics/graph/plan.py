@@ -1,0 +1,138 @@
+"""The compiled frame: which passes run in which order, on which textures, and why the others do not."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+
+from glcaustics.errors import GraphError
+from glcaustics.graph.resources import PassDecl, TextureDesc
+
+
+@dataclass(frozen=True)
+class Step:
+    """A pass that runs.
+
+    Args:
+        decl: what it declared.
+        live_writes: those of its attachments that exist, in the order of declaration.
+        present_optional: those of its optional reads that some pass writes.
+    """
+
+    decl: PassDecl
+    live_writes: tuple[str, ...]
+    present_optional: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the pass."""
+        return self.decl.name
+
+    @property
+    def readable(self) -> tuple[str, ...]:
+        """Everything of this frame that the pass may read."""
+        return (*self.decl.reads, *self.present_optional)
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A pass that does not run, why, and the bytes its attachments would have taken."""
+
+    name: str
+    because: str
+    bytes: int = 0
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What `FrameGraph.compile` decided.
+
+    Args:
+        steps: in execution order.
+        left_out: not applicable passes, then culled ones.
+        outputs: resources that outlive the frame.
+        slots: live resource -> index of its texture in `slot_descs`.
+        slot_descs: the textures to allocate.
+        history_slots: resource -> index of the texture that holds the previous frame's values; the renderer swaps
+            it with `slots[resource]` after each frame.
+        bytes_allocated: memory of `slot_descs`.
+        bytes_without_aliasing: the same if no two resources shared a texture.
+        bytes_without_culling: the same if, besides, every declared pass ran with all its attachments.
+    """
+
+    steps: tuple[Step, ...]
+    left_out: tuple[LeftOut, ...]
+    outputs: tuple[str, ...]
+    slots: Mapping[str, int]
+    slot_descs: tuple[TextureDesc, ...]
+    history_slots: Mapping[str, int]
+    bytes_allocated: int
+    bytes_without_aliasing: int
+    bytes_without_culling: int
+
+    @property
+    def fingerprint(self) -> Hashable:
+        """Equal for two plans iff they run the same passes on the same resources, so that allocations can be kept."""
+        steps = tuple(
+            (s.name, s.readable, s.decl.history, tuple((r, s.decl.writes[r], self.slots[r]) for r in s.live_writes))
+            for s in self.steps
+        )
+        return (steps, self.outputs, tuple(self.history_slots.items()), self.slot_descs)
+
+    def desc(self, resource: str) -> TextureDesc:
+        """Texture of a live resource. Raises GraphError when the plan does not have it."""
+        for step in self.steps:
+            if resource in step.live_writes:
+                return step.decl.writes[resource]
+        raise GraphError(f"'{resource}' is not in the plan", remedy=f"live are: {', '.join(self.slots) or 'none'}")
+
+    def explain(self) -> str:
+        """The plan as a table for people; see `glcaustics.graph.explain`."""
+        from glcaustics.graph.explain import explain
+
+        return explain(self)
+
+    def to_dot(self) -> str:
+        """The plan as a Graphviz digraph; see `glcaustics.graph.explain`."""
+        from glcaustics.graph.explain import to_dot
+
+        return to_dot(self)
+
+
+def check_read(step: Step, resource: str) -> None:
+    """Raise GraphError unless the pass declared that it reads the resource and the resource is there."""
+    if resource in step.readable:
+        return
+    if resource in step.decl.optional:
+        raise GraphError(
+            f"pass '{step.name}' reads the optional '{resource}', which no pass of this frame writes",
+            remedy="ask `present_optional` first",
+        )
+    raise GraphError(
+        f"pass '{step.name}' reads '{resource}', which it did not declare",
+        remedy=f"declared are: {', '.join((*step.decl.reads, *step.decl.optional)) or 'none'}",
+    )
+
+
+def check_history(step: Step, resource: str) -> None:
+    """Raise GraphError unless the pass declared that it reads the previous frame's resource."""
+    if resource not in step.decl.history:
+        raise GraphError(
+            f"pass '{step.name}' reads the history of '{resource}', which it did not declare",
+            remedy=f"declared are: {', '.join(step.decl.history) or 'none'}",
+        )
+
+
+def check_write(step: Step, resource: str) -> None:
+    """Raise GraphError unless the pass declared the attachment and the plan keeps it."""
+    if resource in step.live_writes:
+        return
+    if resource in step.decl.writes:
+        raise GraphError(
+            f"pass '{step.name}' writes '{resource}', which nobody reads, so that it is not allocated",
+            remedy="ask `live_writes` first, or list it in always_writes",
+        )
+    raise GraphError(
+        f"pass '{step.name}' writes '{resource}', which it did not declare",
+        remedy=f"declared are: {', '.join(step.decl.writes) or 'none'}",
+    )
