@@ -1,0 +1,71 @@
+// How far apart the light of neighbouring texels lands: covariance of the splat in texels of the caustic map.
+// C = sigma^2 x mean of the outer products of the one-sided differences of the landing points (for an affine map sigma^2 J J^T), plus
+// the map's own pixel filter (Zwicker et al. 2001, EWA splatting, eq. 14: the sum of both covariances). Two one-sided differences rather
+// than a central one: at a fold they cancel, though the light is spread.
+#include "interface/caster_view.glsl"
+#include "interface/receiver_view.glsl"
+
+uniform sampler2D t_landing;
+uniform sampler2D t_caster_position;
+uniform sampler2D t_receiver_normal;
+uniform float u_sigma;          // standard deviation of a splat in units of the distance to its neighbour
+uniform float u_max_radius;     // texels
+
+layout(location = 0) out vec4 o_splat;  // x, y: centre in texels of the map; z: radius, texels (0: no splat); w: face
+layout(location = 1) out vec4 o_conic;  // xyz: inverse covariance (a, b, c); w: 1 / integral of the kernel
+
+const float GLC_PIXEL_VARIANCE = 0.2;   // texels^2: the map's own filter
+const float GLC_CUTOFF = 7.0;           // squared Mahalanobis radius where the kernel ends; SPLAT_CUTOFF in splat.frag
+
+// Difference of landing points to a neighbour, metres; valid = false across a silhouette, another object or a lost ray.
+vec3 difference(ivec2 texel, ivec2 step, vec4 here, float object, out bool valid) {
+    ivec2 there = texel + step;
+    valid = false;
+    if (any(lessThan(there, ivec2(0))) || any(greaterThanEqual(there, textureSize(t_landing, 0)))) return vec3(0.0);
+    vec4 landing = texelFetch(t_landing, there, 0);
+    valid = landing.w > 0.0 && texelFetch(t_caster_position, there, 0).w == object;
+    return valid ? landing.xyz - here.xyz : vec3(0.0);
+}
+
+// Mean covariance of the two one-sided differences along one grid axis; of two that differ by far, the longer one crosses an edge.
+vec3 axis_covariance(GlcView view, vec3 centre, int face, vec4 here, float object, ivec2 texel, ivec2 step) {
+    bool ok_a, ok_b;
+    vec3 a = difference(texel, step, here, object, ok_a);
+    vec3 b = difference(texel, -step, here, object, ok_b);
+    float la = dot(a, a), lb = dot(b, b);
+    if (ok_a && ok_b) {
+        if (la > 16.0 * lb + 1e-30) ok_a = false;
+        else if (lb > 16.0 * la + 1e-30) ok_b = false;
+    }
+    vec2 ua = ok_a ? glc_view_project_on(view, here.xyz + a, face).xy - centre.xy : vec2(0.0);
+    vec2 ub = ok_b ? glc_view_project_on(view, here.xyz + b, face).xy - centre.xy : vec2(0.0);
+    float count = float(ok_a) + float(ok_b);
+    if (count == 0.0) return vec3(0.0);
+    return (vec3(ua.x * ua.x, ua.x * ua.y, ua.y * ua.y) + vec3(ub.x * ub.x, ub.x * ub.y, ub.y * ub.y)) / count;
+}
+
+void main() {
+    o_splat = vec4(0.0);
+    o_conic = vec4(0.0);
+    ivec2 texel = ivec2(gl_FragCoord.xy);
+    vec4 here = texelFetch(t_landing, texel, 0);
+    if (here.w <= 0.0) return;
+    float object = texelFetch(t_caster_position, texel, 0).w;
+    GlcView view = glc_receiver_view();
+    int face = glc_view_face(view, here.xyz);
+    vec3 centre = glc_view_project_on(view, here.xyz, face);
+    vec3 c = axis_covariance(view, centre, face, here, object, texel, ivec2(1, 0))
+           + axis_covariance(view, centre, face, here, object, texel, ivec2(0, 1));
+    c = c * (u_sigma * u_sigma) + vec3(GLC_PIXEL_VARIANCE, 0.0, GLC_PIXEL_VARIANCE);
+    float mean = 0.5 * (c.x + c.z);
+    float largest = mean + sqrt(max(mean * mean - (c.x * c.z - c.y * c.y), 0.0));
+    float radius = sqrt(GLC_CUTOFF * largest);
+    // A splat wider than the limit keeps its flux and its shape, not its size.
+    float shrink = min(1.0, u_max_radius / radius);
+    c *= shrink * shrink;
+    float det = max(c.x * c.z - c.y * c.y, 1e-8);
+    // Integral of exp(-q/2) - exp(-Q/2) over q < Q.
+    float integral = 2.0 * GLC_PI * sqrt(det) * (1.0 - exp(-0.5 * GLC_CUTOFF) * (1.0 + 0.5 * GLC_CUTOFF));
+    o_splat = vec4(centre.xy, radius * shrink, float(face));
+    o_conic = vec4(c.z / det, -c.y / det, c.x / det, 1.0 / integral);
+}

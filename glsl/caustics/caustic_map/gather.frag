@@ -1,0 +1,60 @@
+// Caustic irradiance at the camera's opaque pixels: look-up in one light's caustic map by projection, as in shadow mapping
+// (Shah et al. 2007, sec. III B). E = flux of the texel x cos / cross-section: the receiver's own area, not the light's.
+#include "interface/receiver_view.glsl"
+#include "interface/camera.glsl"
+
+uniform sampler2D t_depth_m;
+uniform sampler2D t_normal_ws;
+uniform sampler2D t_receiver_position;
+uniform sampler2D t_flux;
+
+in vec2 v_uv;
+layout(location = 0) out vec4 o_irradiance;  // W/m^2 or lux
+
+// 1 where the texel of the map holds the surface that p lies on.
+float same_surface(GlcView view, vec3 p_ws, vec3 n_ws, vec3 l, float width, ivec2 texel) {
+    vec4 stored = texelFetch(t_receiver_position, texel, 0);
+    if (stored.w == 0.0) return 0.0;
+    vec3 off = stored.xyz - p_ws;
+    // Off the tangent plane, in texel widths; along a surface that the light grazes a texel reaches further.
+    float cos_l = max(abs(dot(n_ws, l)), 0.1);
+    return abs(dot(off, n_ws)) < 2.0 * width && length(off) < 4.0 * width / cos_l ? 1.0 : 0.0;
+}
+
+void main() {
+    o_irradiance = vec4(0.0);
+    float depth_m = texelFetch(t_depth_m, ivec2(gl_FragCoord.xy), 0).r;
+    if (depth_m <= 0.0) return;
+    vec3 p = glc_camera_position_ws(v_uv, depth_m);
+    vec3 n = texelFetch(t_normal_ws, ivec2(gl_FragCoord.xy), 0).xyz;
+    GlcView view = glc_receiver_view();
+    vec3 l = glc_light_direction(view, p);
+    // A two-sided sheet is lit on the side that the eye sees; the map holds the side that the light sees.
+    float cos_l = dot(n, -l);
+    if (cos_l <= 0.0) return;
+    vec3 projected = glc_view_project(view, p);
+    if (!glc_view_inside(view, projected)) return;
+    float width = glc_texel_width(view, p);
+
+    vec2 at = projected.xy - 0.5;
+    ivec2 base = ivec2(floor(at));
+    vec2 f = at - vec2(base);
+    ivec2 lower = ivec2(0), upper = ivec2(view.size) - 1;
+#if RECEIVER_FACES == 6
+    ivec2 tile = ivec2(view.size / vec2(3.0, 2.0));
+    lower = ivec2(projected.xy) / tile * tile;
+    upper = lower + tile - 1;
+#endif
+    vec4 weights = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
+    vec3 flux = vec3(0.0);
+    float total = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        ivec2 texel = clamp(base + ivec2(i & 1, i >> 1), lower, upper);
+        float w = weights[i] * same_surface(view, p, n, l, width, texel);
+        if (w <= 0.0) continue;
+        flux += w * texelFetch(t_flux, texel, 0).rgb;
+        total += w;
+    }
+    if (total < 0.05) return;
+    o_irradiance = vec4(flux / total * cos_l / glc_texel_cross_section(view, p), 1.0);
+}

@@ -1,0 +1,144 @@
+#include "common/light_view.glsl"
+
+// Where a ray meets a surface that is known as positions + normals in a light's view (Shah, Konttinen, Pattanaik 2007,
+// sec. III C and appendix). Three estimates of the distance t along the ray:
+//   GLC_FIXED_POINT  t' = |X(o + t d) - o|                                            (their sec. III C)
+//   GLC_NEWTON_FD    Newton on the signed light distance, derivative by finite difference  (their appendix)
+//   GLC_HYBRID       safeguarded secant that bisects when iterates alternate, then a bracketing march for the rest
+// X(p) is the stored position at the texel that p projects to. Theirs starts at d = 1 and uses eps = 0.1 scene units; here the
+// start is the distance to the surface straight behind the ray's origin, and lengths are counted in texel widths: scale-free.
+// Every estimate ends on the tangent plane at the last texel: exact on planes, second order on curved surfaces.
+
+#define GLC_FIXED_POINT 0
+#define GLC_NEWTON_FD 1
+#define GLC_HYBRID 2
+
+#define GLC_CONVERGED 1
+#define GLC_BRACKETED 2
+#define GLC_MISSED -2
+#define GLC_UNCONVERGED -3
+
+struct GlcHit {
+    float t;            // metres along the ray
+    vec3 position_ws;
+    vec3 normal_ws;     // at the texel, as stored
+    int iterations;     // texel look-ups
+    int status;         // GLC_CONVERGED, GLC_BRACKETED, GLC_MISSED, GLC_UNCONVERGED
+};
+
+struct GlcProbe {
+    float gap;       // signed light distance from p to the stored surface, metres: > 0 while p is in front of it
+    bool valid;      // a surface is stored there
+    ivec2 texel;
+    vec3 surface_ws;
+};
+
+GlcProbe glc_probe(sampler2D t_position, GlcView view, vec3 p_ws, float far_m) {
+    vec3 projected = glc_view_project(view, p_ws);
+    GlcProbe probe = GlcProbe(far_m, false, ivec2(projected.xy), p_ws);
+    if (!glc_view_inside(view, projected)) return probe;
+    vec4 stored = texelFetch(t_position, probe.texel, 0);
+    if (stored.w == 0.0) return probe;
+    probe.valid = true;
+    probe.surface_ws = stored.xyz;
+    probe.gap = glc_light_distance(view, stored.xyz) - glc_light_distance(view, p_ws);
+    return probe;
+}
+
+// Accepts the ray's point on the tangent plane at the probed texel when it lies within `reach` texel widths of the texel.
+bool glc_settle(sampler2D t_normal, GlcView view, GlcProbe probe, vec3 o, vec3 d, float reach, inout GlcHit hit) {
+    vec3 n = glc_safe_normalize(texelFetch(t_normal, probe.texel, 0).xyz, -d);
+    float d_n = dot(d, n);
+    float width = glc_texel_width(view, probe.surface_ws);
+    float t = abs(d_n) > 1e-3 ? dot(probe.surface_ws - o, n) / d_n : hit.t;
+    vec3 p = o + t * d;
+    vec3 off = p - probe.surface_ws;
+    vec3 l = glc_light_direction(view, p);
+    // Perpendicular to the light one texel is the resolution; along the light a slope stretches it, which the plane follows.
+    float sideways = length(off - l * dot(off, l));
+    if (t < 0.0 || sideways > reach * width) return false;
+    hit.t = t;
+    hit.position_ws = p;
+    hit.normal_ws = n;
+    return true;
+}
+
+const float GLC_REACH = 1.5;  // texel widths: half a texel's diagonal, plus one for the step still to go
+
+// Bracketing march over (0, t_max]: finds the first crossing from in front of the surface to behind it that really is the
+// surface (a ray that passes behind an occluder crosses too, but does not settle).
+GlcHit glc_intersect_march(sampler2D t_position, sampler2D t_normal, GlcView view, vec3 o, vec3 d, float t_max, int steps) {
+    GlcHit hit = GlcHit(0.0, o, -d, 0, GLC_MISSED);
+    float t_front = 0.0;
+    bool in_front = true;
+    for (int i = 1; i <= steps; ++i) {
+        float t = t_max * float(i) / float(steps);
+        GlcProbe probe = glc_probe(t_position, view, o + t * d, t_max);
+        hit.iterations += 1;
+        if (probe.gap > 0.0) { t_front = t; in_front = true; continue; }
+        if (!in_front) continue;
+        float lo = t_front, hi = t;
+        for (int k = 0; k < 10; ++k) {
+            float mid = 0.5 * (lo + hi);
+            GlcProbe middle = glc_probe(t_position, view, o + mid * d, t_max);
+            if (middle.gap > 0.0) { lo = mid; } else { hi = mid; probe = middle; }
+        }
+        hit.iterations += 10;
+        hit.t = hi;
+        if (glc_settle(t_normal, view, probe, o, d, GLC_REACH, hit)) { hit.status = GLC_BRACKETED; return hit; }
+        in_front = false;
+        t_front = t;
+    }
+    return hit;
+}
+
+GlcHit glc_intersect(sampler2D t_position, sampler2D t_normal, GlcView view, vec3 o, vec3 d, float t_max,
+                     int estimate, int max_iterations, int march_steps) {
+    GlcHit hit = GlcHit(0.0, o, -d, 0, GLC_UNCONVERGED);
+    GlcProbe start = glc_probe(t_position, view, o, t_max);
+    hit.iterations = 1;
+    float t = start.valid ? min(length(start.surface_ws - o), t_max) : 0.5 * t_max;
+    float t_before = 0.0, gap_before = start.gap;
+    float lo = 0.0, hi = t_max;
+    bool bracketed = false;
+    for (int i = 0; i < max_iterations; ++i) {
+        vec3 p = o + t * d;
+        GlcProbe probe = glc_probe(t_position, view, p, t_max);
+        hit.iterations += 1;
+        hit.t = t;
+        if (probe.valid) {
+            float width = glc_texel_width(view, probe.surface_ws);
+            // The normal is fetched only where the surface is near: most iterates need one look-up.
+            if (abs(probe.gap) < 6.0 * width && glc_settle(t_normal, view, probe, o, d, GLC_REACH, hit)) {
+                hit.status = GLC_CONVERGED;
+                return hit;
+            }
+        }
+        float next = t;
+        if (estimate == GLC_FIXED_POINT) {
+            next = probe.valid ? length(probe.surface_ws - o) : t_max;
+        } else if (estimate == GLC_NEWTON_FD) {
+            float eps = 2.0 * glc_texel_width(view, p);
+            float slope = (glc_probe(t_position, view, p + eps * d, t_max).gap - probe.gap) / eps;
+            hit.iterations += 1;
+            next = abs(slope) > 1e-4 ? t - probe.gap / slope : t_max;
+        } else {
+            if (probe.gap > 0.0) { lo = t; } else { hi = t; bracketed = true; }
+            float rise = probe.gap - gap_before;
+            next = abs(rise) > 1e-6 * t_max ? t - probe.gap * (t - t_before) / rise : 0.5 * (lo + hi);
+            float margin = 0.02 * (hi - lo);
+            if (bracketed && (next <= lo + margin || next >= hi - margin)) next = 0.5 * (lo + hi);
+        }
+        t_before = t;
+        gap_before = probe.gap;
+        t = clamp(next, 0.0, t_max);
+    }
+    if (estimate != GLC_HYBRID || march_steps == 0) {
+        GlcProbe last = glc_probe(t_position, view, o + t * d, t_max);
+        if (!last.valid) hit.status = GLC_MISSED;
+        return hit;
+    }
+    GlcHit marched = glc_intersect_march(t_position, t_normal, view, o, d, t_max, march_steps);
+    marched.iterations += hit.iterations;
+    return marched;
+}

@@ -1,0 +1,47 @@
+// Geometric optics at one interface. Pure functions, no uniforms.
+// Sources: Born & Wolf 1999, sec. 1.5 (Fresnel); Pharr, Jakob, Humphreys 2023 (pbrt-v4), ch. 9.3-9.5; Schlick 1994.
+
+const float GLC_PI = 3.14159265358979;
+
+// Unpolarised reflectance of a dielectric. cos_i: cosine of incidence on the side the light comes from, in [0, 1];
+// eta = n_to / n_from. 1 under total internal reflection.
+float glc_fresnel_dielectric(float cos_i, float eta) {
+    cos_i = clamp(cos_i, 0.0, 1.0);
+    float cos_t2 = 1.0 - (1.0 - cos_i * cos_i) / (eta * eta);
+    if (cos_t2 <= 0.0) return 1.0;
+    float cos_t = sqrt(cos_t2);
+    float r_parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
+    float r_perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
+    return 0.5 * (r_parallel * r_parallel + r_perpendicular * r_perpendicular);
+}
+
+// Reflectance of a metal as glTF 2.0 defines it (Schlick 1994): f0 is the base colour.
+vec3 glc_fresnel_metal(vec3 f0, float cos_i) {
+    float m = 1.0 - clamp(cos_i, 0.0, 1.0);
+    float m2 = m * m;
+    return f0 + (1.0 - f0) * (m2 * m2 * m);
+}
+
+// Snell refraction. d: unit direction of travel; n: unit normal against d (dot(n, d) <= 0); eta = n_to / n_from.
+// Returns false under total internal reflection; then `transmitted` is the mirror direction.
+bool glc_refract(vec3 d, vec3 n, float eta, out vec3 transmitted) {
+    float cos_i = -dot(n, d);
+    float k = 1.0 - (1.0 - cos_i * cos_i) / (eta * eta);
+    if (k <= 0.0) {
+        transmitted = reflect(d, n);
+        return false;
+    }
+    transmitted = normalize(d / eta + n * (cos_i / eta - sqrt(k)));
+    return true;
+}
+
+// Beer-Lambert transmittance over distance_m metres; sigma_a in 1/m.
+vec3 glc_transmittance(vec3 sigma_a, float distance_m) {
+    return exp(-sigma_a * max(distance_m, 0.0));
+}
+
+// A vector of unit length, or `fallback` where v has none (normalize(0) is NaN).
+vec3 glc_safe_normalize(vec3 v, vec3 fallback) {
+    float l2 = dot(v, v);
+    return l2 > 0.0 ? v * inversesqrt(l2) : fallback;
+}

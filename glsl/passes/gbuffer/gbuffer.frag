@@ -1,0 +1,111 @@
+// The camera's G-buffer: opaque layer, specular layer or (BACK) the specular layer's back faces. Only attachments that some
+// pass reads exist (HAS_...). LAYER_SPECULAR keeps what lies in front of the opaque layer.
+#include "common/optics.glsl"
+#if HAS_ALBEDO || HAS_MATERIAL || HAS_EMISSIVE
+#include "interface/objects.glsl"
+#endif
+
+in float v_depth_m;
+in vec3 v_position_ws;
+#if HAS_NORMAL
+in vec3 v_normal_ws;
+#endif
+#if HAS_UV
+in vec2 v_uv;
+#endif
+#if HAS_MOTION
+in vec4 v_clip;
+in vec4 v_previous_clip;
+#endif
+
+uniform float u_object;
+uniform vec3 u_eye_ws;
+uniform vec4 u_eye_direction;   // w = 1: orthographic, xyz = view direction
+#if LAYER_SPECULAR
+uniform sampler2D t_opaque_depth_m;
+#endif
+#if BACK
+uniform sampler2D t_front_depth_m;
+uniform sampler2D t_front_normal;
+#endif
+#if HAS_BASE_COLOR_MAP
+uniform sampler2D t_base_color;
+#endif
+#if HAS_METALLIC_ROUGHNESS_MAP
+uniform sampler2D t_metallic_roughness;
+#endif
+#if HAS_EMISSIVE_MAP
+uniform sampler2D t_emissive;
+#endif
+
+#if HAS_DEPTH_M
+layout(location = LOCATION_DEPTH_M) out float o_depth_m;       // along the view axis, metres; 0 = nothing
+#endif
+#if HAS_NORMAL_WS
+layout(location = LOCATION_NORMAL_WS) out vec4 o_normal_ws;    // towards the eye; w: object index + 1, negative: seen from its back
+#endif
+#if HAS_ALBEDO
+layout(location = LOCATION_ALBEDO) out vec4 o_albedo;          // base colour, linear; w: metallic
+#endif
+#if HAS_MATERIAL
+layout(location = LOCATION_MATERIAL) out vec4 o_material;      // x: roughness
+#endif
+#if HAS_EMISSIVE
+layout(location = LOCATION_EMISSIVE) out vec4 o_emissive;      // radiance, cd/m^2 or W/(m^2 sr)
+#endif
+#if HAS_MOTION
+layout(location = LOCATION_MOTION) out vec2 o_motion;          // uv now - uv in the last frame
+#endif
+
+vec3 linear_from_srgb(vec3 c) {
+    return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(vec3(0.04045), c));
+}
+
+void main() {
+#if LAYER_SPECULAR
+    float opaque_m = texelFetch(t_opaque_depth_m, ivec2(gl_FragCoord.xy), 0).r;
+    if (opaque_m > 0.0 && v_depth_m >= opaque_m) discard;
+#endif
+#if BACK
+    if (v_depth_m <= texelFetch(t_front_depth_m, ivec2(gl_FragCoord.xy), 0).r) discard;
+    if (abs(texelFetch(t_front_normal, ivec2(gl_FragCoord.xy), 0).w) != u_object + 1.0) discard;
+#endif
+#if HAS_DEPTH_M
+    o_depth_m = v_depth_m;
+#endif
+#if HAS_NORMAL_WS
+    vec3 view = u_eye_direction.w == 1.0 ? u_eye_direction.xyz : normalize(v_position_ws - u_eye_ws);
+    vec3 n = glc_safe_normalize(v_normal_ws, -view) * (gl_FrontFacing ? 1.0 : -1.0);
+    o_normal_ws = vec4(n, (u_object + 1.0) * (gl_FrontFacing ? 1.0 : -1.0));
+#endif
+#if HAS_ALBEDO || HAS_MATERIAL
+    vec4 t0 = texelFetch(t_objects, ivec2(0, int(u_object)), 0);
+    float roughness = texelFetch(t_objects, ivec2(1, int(u_object)), 0).w;
+    float metallic = texelFetch(t_objects, ivec2(3, int(u_object)), 0).w;
+    vec3 albedo = t0.rgb;
+#if HAS_BASE_COLOR_MAP
+    albedo *= linear_from_srgb(texture(t_base_color, v_uv).rgb);
+#endif
+#if HAS_METALLIC_ROUGHNESS_MAP
+    vec4 mr = texture(t_metallic_roughness, v_uv);
+    roughness *= mr.g;
+    metallic *= mr.b;
+#endif
+#if HAS_ALBEDO
+    o_albedo = vec4(albedo, metallic);
+#endif
+#if HAS_MATERIAL
+    o_material = vec4(roughness, 0.0, 0.0, 0.0);
+#endif
+#endif
+#if HAS_EMISSIVE
+    vec3 emissive = texelFetch(t_objects, ivec2(3, int(u_object)), 0).rgb;
+#if HAS_EMISSIVE_MAP
+    emissive *= linear_from_srgb(texture(t_emissive, v_uv).rgb);
+#endif
+    o_emissive = vec4(emissive, 0.0);
+#endif
+#if HAS_MOTION
+    o_motion = 0.5 * (v_clip.xy / v_clip.w - v_previous_clip.xy / v_previous_clip.w);
+#endif
+}

@@ -1,0 +1,44 @@
+// Position and normal of the first surface seen from a light. position.w = object index + 1 (0: nothing there);
+// normal.w = +1 on the front of the triangle, -1 on its back. The normal is the mesh's own, not turned to the light.
+// OCCLUDER 1: opaque geometry in the way, stored as nothing. BACK 1: the first back face of the same object behind its front.
+#include "common/optics.glsl"
+
+in vec3 v_position_ws;
+in vec3 v_normal_ws;
+
+#if !OCCLUDER
+uniform float u_object;
+#endif
+#if BACK
+uniform sampler2D t_front_position;
+uniform vec4 u_light;
+#endif
+
+#if HAS_POSITION
+layout(location = LOCATION_POSITION) out vec4 o_position_ws;
+#endif
+#if HAS_NORMAL
+layout(location = LOCATION_NORMAL) out vec4 o_normal_ws;
+#endif
+
+void main() {
+#if OCCLUDER
+    vec4 position = vec4(0.0), normal = vec4(0.0);
+#else
+    vec4 position = vec4(v_position_ws, u_object + 1.0);
+    vec4 normal = vec4(glc_safe_normalize(v_normal_ws, vec3(0.0)), gl_FrontFacing ? 1.0 : -1.0);
+#endif
+#if BACK
+    vec4 front = texelFetch(t_front_position, ivec2(gl_FragCoord.xy), 0);
+    if (front.w != position.w) discard;
+    vec3 d = v_position_ws - front.xyz;
+    vec3 l = u_light.w == 0.0 ? u_light.xyz : v_position_ws - u_light.xyz;
+    if (dot(d, l) <= 0.0) discard;
+#endif
+#if HAS_POSITION
+    o_position_ws = position;
+#endif
+#if HAS_NORMAL
+    o_normal_ws = normal;
+#endif
+}

@@ -1,0 +1,52 @@
+// Outgoing radiance of the opaque layer: albedo / pi x (direct + caustic + sky irradiance) + highlights + emission; the sky elsewhere.
+#include "common/optics.glsl"
+#include "interface/camera.glsl"
+#include "interface/sky.glsl"
+
+uniform sampler2D t_depth_m;
+uniform sampler2D t_normal_ws;
+uniform sampler2D t_albedo;
+uniform sampler2D t_irradiance;
+#if HAS_HIGHLIGHT
+uniform sampler2D t_highlight;
+#endif
+#if HAS_EMISSIVE
+uniform sampler2D t_emissive;
+#endif
+#if HAS_CAUSTICS
+uniform sampler2D t_caustics;
+#endif
+#if HAS_OCCLUSION
+uniform sampler2D t_occlusion;
+#endif
+
+in vec2 v_uv;
+layout(location = 0) out vec4 o_radiance;
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    if (texelFetch(t_depth_m, pixel, 0).r <= 0.0) {
+        o_radiance = vec4(glc_sky_radiance(glc_camera_ray_ws(v_uv)), 1.0);
+        return;
+    }
+    vec3 n = texelFetch(t_normal_ws, pixel, 0).xyz;
+    vec4 albedo = texelFetch(t_albedo, pixel, 0);
+    vec3 ambient = glc_sky_irradiance(n);
+#if HAS_OCCLUSION
+    ambient *= texelFetch(t_occlusion, pixel, 0).r;
+#endif
+    vec3 irradiance = texelFetch(t_irradiance, pixel, 0).rgb + ambient;
+#if HAS_CAUSTICS
+    irradiance += texelFetch(t_caustics, pixel, 0).rgb;
+#endif
+    vec3 radiance = albedo.rgb * (1.0 - albedo.w) * irradiance / GLC_PI;
+    // A rough metal has no diffuse part; its share of the sky comes with the base colour.
+    radiance += albedo.rgb * albedo.w * ambient / GLC_PI;
+#if HAS_HIGHLIGHT
+    radiance += texelFetch(t_highlight, pixel, 0).rgb;
+#endif
+#if HAS_EMISSIVE
+    radiance += texelFetch(t_emissive, pixel, 0).rgb;
+#endif
+    o_radiance = vec4(radiance, 1.0);
+}
