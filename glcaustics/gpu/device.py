@@ -1,0 +1,381 @@
+"""The device: a context with checked resources, strict programs, timers and a guard for the host's state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from glcaustics.errors import DeviceError, ResourceLimitError, ShaderError, UsageError
+from glcaustics.gpu.backends import APT_REMEDY, AUTO_ORDER, Opened, open_backend
+from glcaustics.gpu.program import Program
+from glcaustics.gpu.rawgl import RawGL
+from glcaustics.gpu.shader_source import ShaderLoader
+from glcaustics.gpu.state_guard import guard_state
+from glcaustics.gpu.texture import make_framebuffer, make_texture
+from glcaustics.gpu.timer import Timers
+
+_SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "swrast", "software")
+_BLENDS = {
+    "add": (moderngl.FUNC_ADD, (moderngl.ONE, moderngl.ONE)),
+    "alpha": (moderngl.FUNC_ADD, (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA)),
+    "min": (moderngl.MIN, (moderngl.ONE, moderngl.ONE)),
+    "max": (moderngl.MAX, (moderngl.ONE, moderngl.ONE)),
+}
+
+
+def create_device(
+    backend: str = "auto", context: moderngl.Context | None = None, *, shader_root: Path | None = None
+) -> Device:
+    """Open a device, or wrap a host's context.
+
+    Args:
+        backend: "egl", "osmesa", "glfw" (a hidden window), or "auto", which tries them in that order and announces
+            the one it took and why the others failed.
+        context: a host's moderngl context, current; `backend` is then not used, and `close` leaves it alive.
+        shader_root: another folder of shaders than the project's own; for tests.
+
+    Raises:
+        DeviceError: nothing works; one line with the command that mends it.
+    """
+    if context is not None:
+        if context.version_code < 330:
+            raise DeviceError(f"the host's context has OpenGL {context.version_code / 100:.1f}, needed is 3.3 core")
+        return Device(Opened(context, lambda: None), "host", ["using the host's context"], shader_root)
+    if backend != "auto":
+        return Device(open_backend(backend), backend, [f"backend {backend}"], shader_root)
+    failures = []
+    for name in AUTO_ORDER:
+        try:
+            opened = open_backend(name)
+        except DeviceError as error:
+            failures.append(f"{name} failed: {error.what}")
+            continue
+        return Device(opened, name, [*failures, f"backend auto took {name}"], shader_root)
+    raise DeviceError(
+        f"no backend gives OpenGL 3.3 core ({'; '.join(failures)})",
+        remedy=f"on Debian or Ubuntu: {APT_REMEDY['egl']} libosmesa6; `glcaustics doctor` tells more",
+    )
+
+
+class Device:
+    """What the rest of the project sees of the driver. Made by `create_device`.
+
+    Attributes:
+        ctx: the moderngl context.
+        backend: "egl", "osmesa", "glfw" or "host".
+        announcements: lines for the user: which backend was taken and why others failed.
+        info: renderer, vendor, version and limits, JSON-able.
+        is_software: the renderer runs on the CPU.
+        timing_enabled: whether `timer` measures.
+    """
+
+    def __init__(self, opened: Opened, backend: str, announcements: list[str], shader_root: Path | None = None) -> None:
+        self._opened = opened
+        self.ctx = opened.ctx
+        self.backend = backend
+        self.announcements = announcements
+        self.raw = RawGL(self.ctx)
+        self.info = _info(self.ctx, self.raw)
+        self.is_software = any(word in self.info["renderer"].lower() for word in _SOFTWARE)
+        self.closed = False
+        self._loader = ShaderLoader(shader_root)
+        self._programs: dict[tuple[Any, ...], Program] = {}
+        self._fullscreen: dict[Program, moderngl.VertexArray] = {}
+        self._timers = Timers(self.ctx, self.raw, self.is_software)
+        self.check_error("opening the device")
+
+    # -- life ---------------------------------------------------------------------------------------------------------
+
+    def make_current(self) -> None:
+        """Direct this thread's OpenGL calls to this device: needed where one program opens several. A host's context
+        is the host's own business and left as it is."""
+        if self.backend in ("egl", "osmesa"):
+            self.ctx.mglo.__enter__()
+        elif self.backend == "glfw":
+            import glfw
+
+            glfw.make_context_current(self._opened.keep)
+
+    def close(self) -> None:
+        """Release programs and, unless it is the host's, the context. Twice is once."""
+        if self.closed:
+            return
+        self.closed = True
+        self.make_current()
+        self._timers.release()
+        for array in self._fullscreen.values():
+            array.release()
+        for program in self._programs.values():
+            program.release()
+        self._fullscreen.clear()
+        self._programs.clear()
+        self._opened.close()
+
+    def __enter__(self) -> Device:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # -- resources ----------------------------------------------------------------------------------------------------
+
+    def texture(
+        self,
+        size: tuple[int, int],
+        format: str,
+        *,
+        filter: str = "nearest",
+        compare: bool = False,
+        label: str = "",
+        data: Any = None,
+        repeat: bool = False,
+        mipmaps: bool = False,
+    ) -> moderngl.Texture:
+        """A 2-D texture, clamped to its edge unless `repeat`.
+
+        Args:
+            size: (width, height) in texels.
+            format: a key of `gpu.texture.FORMATS`; "depth24" and "depth32f" are depth textures.
+            filter: "nearest" or "linear".
+            compare: depth comparison (<=) for `sampler2DShadow`.
+            label: name in messages and graphics debuggers.
+            data: bytes, or array (H, W) or (H, W, C); the first row is the lowest (v = 0).
+            mipmaps: build the mip chain of `data` and filter by it.
+
+        Raises:
+            ResourceLimitError: larger than the driver allows, or the driver has no memory for it.
+            UsageError: unknown format, or data that does not fit.
+        """
+        limit = self.info["max_texture_size"]
+        texture = make_texture(
+            self.ctx, self.raw, limit, size, format, filter=filter, compare=compare, label=label, data=data,
+            repeat=repeat, mipmaps=mipmaps,
+        )  # fmt: skip
+        self._label(texture, label)
+        return texture
+
+    def framebuffer(
+        self, colors: Sequence[moderngl.Texture] = (), depth: moderngl.Texture | None = None, label: str = ""
+    ) -> moderngl.Framebuffer:
+        """A complete framebuffer of the given attachments. Raises DeviceError when the driver calls it incomplete."""
+        limit = self.info["max_draw_buffers"]
+        if len(colors) > limit:
+            raise ResourceLimitError(f"framebuffer '{label}': {len(colors)} colour attachments, allowed are {limit}")
+        framebuffer = make_framebuffer(self.ctx, colors, depth, label)
+        framebuffer.extra = label
+        self._label(framebuffer, label)
+        return framebuffer
+
+    def buffer(self, data: Any = None, label: str = "", *, reserve: int = 0, dynamic: bool = False) -> moderngl.Buffer:
+        """A buffer of bytes or a NumPy array, or of `reserve` bytes. Raises ResourceLimitError when memory is out."""
+        if data is None and reserve < 1:
+            raise UsageError(f"buffer '{label}' has neither data nor a size")
+        payload = np.ascontiguousarray(data).tobytes() if isinstance(data, np.ndarray) else data
+        if payload is not None and len(payload) == 0:
+            raise UsageError(f"buffer '{label}' has no data", remedy="leave out what is empty")
+        self.ctx.clear_errors()
+        buffer = self.ctx.buffer(payload, reserve=reserve, dynamic=dynamic)
+        if self.ctx.error != "GL_NO_ERROR":
+            size = len(payload) if payload is not None else reserve
+            buffer.release()
+            raise ResourceLimitError(f"buffer '{label}': the driver refused {size / 1e6:.0f} MB", remedy="use a smaller mesh")
+        buffer.extra = label
+        self._label(buffer, label)
+        return buffer
+
+    def _label(self, thing: Any, label: str) -> None:
+        if label and self.ctx.supports_labels:
+            thing.label = label[: max(self.ctx.max_label_length - 1, 0)]
+
+    # -- programs and drawing -----------------------------------------------------------------------------------------
+
+    def program(
+        self,
+        path: str,
+        defines: Mapping[str, Any] | None = None,
+        varyings: Sequence[str] = (),
+        *,
+        vertex: str | None = None,
+    ) -> Program:
+        """Load, compile and cache `glsl/<path>.vert`, `.geom`, `.frag`; without a `.vert` the full-screen triangle.
+
+        Args:
+            path: relative to `glsl/`, without suffix.
+            defines: permutation; see `ShaderLoader.load`.
+            varyings: outputs captured by transform feedback.
+            vertex: another vertex shader, with suffix.
+
+        Raises:
+            ShaderError: with the file and line of the shader's own file.
+        """
+        key = (path, tuple(sorted((defines or {}).items())), tuple(varyings), vertex)
+        program = self._programs.get(key)
+        if program is None:
+            words = " ".join(f"{name}={value}" for name, value in sorted((defines or {}).items()))
+            label = f"{path} [{words}]" if words else path
+            source = self._loader.load(path, defines, vertex=vertex)
+            program = Program(self.ctx, source, label, tuple(varyings))
+            self._label(program.gl, label)
+            self._programs[key] = program
+        return program
+
+    def vertex_array(
+        self, program: Program, content: Sequence[tuple[Any, ...]], index_buffer: moderngl.Buffer | None = None
+    ) -> moderngl.VertexArray:
+        """Bind buffers to a program's inputs.
+
+        Args:
+            content: tuples (buffer, moderngl format, name, ...), "3f 3f", "in_position", "in_normal"; per-instance "3f/i".
+            index_buffer: 32-bit unsigned indices.
+
+        Raises:
+            ShaderError: the vertex shader declares no such input. One that was optimised out is passed over.
+        """
+        for _, _, *names in content:
+            for name in names:
+                if name not in program.source.attributes:
+                    declared = ", ".join(sorted(program.source.attributes)) or "none"
+                    raise ShaderError(f"no vertex input '{name}'", where=program.label, remedy=f"declared are: {declared}")
+        return self.ctx.vertex_array(program.gl, list(content), index_buffer, skip_errors=True)
+
+    def draw_fullscreen(
+        self, program: Program, fbo: moderngl.Framebuffer, *, blend: str | None = None,
+        viewport: tuple[int, int, int, int] | None = None,
+    ) -> None:  # fmt: skip
+        """One triangle over the framebuffer (or a part of it): no depth test, no culling, no blending unless asked."""
+        array = self._fullscreen.get(program)
+        if array is None:
+            array = self._fullscreen[program] = self.ctx.vertex_array(program.gl, [])
+        self.draw(array, program, fbo, vertices=3, blend=blend, viewport=viewport)
+
+    def draw(
+        self,
+        array: moderngl.VertexArray,
+        program: Program,
+        fbo: moderngl.Framebuffer,
+        *,
+        mode: int = moderngl.TRIANGLES,
+        vertices: int = -1,
+        instances: int = 1,
+        first: int = 0,
+        depth_func: str | None = None,
+        depth_write: bool = True,
+        blend: str | None = None,
+        cull: str | None = None,
+        point_size: bool = False,
+        viewport: tuple[int, int, int, int] | None = None,
+    ) -> None:
+        """Draw with exactly the state that is named here; nothing carries over from an earlier draw.
+
+        Args:
+            mode: moderngl primitive mode.
+            vertices, instances, first: as in moderngl; -1 vertices = all.
+            depth_func: "<", "<=", ">", ">=", "==", "1" (always), or None for no depth test and no depth write.
+            depth_write: with a depth test, whether depth is written.
+            blend: None, "add", "alpha", "min" or "max". Additive blending into 32-bit float needs no more than GL 3.3.
+            cull: None, "back" or "front".
+            point_size: `gl_PointSize` counts.
+            viewport: (x, y, width, height) in texels; the whole framebuffer by default.
+
+        Raises:
+            ShaderError: a sampler without texture, or one whose texture is also drawn to.
+        """
+        self._check_feedback(program, fbo)
+        ctx = self.ctx
+        fbo.viewport = viewport or (0, 0, *fbo.size)
+        fbo.depth_mask = depth_write
+        fbo.use()
+        flags = moderngl.PROGRAM_POINT_SIZE if point_size else moderngl.NOTHING
+        if depth_func is not None:
+            flags |= moderngl.DEPTH_TEST
+            ctx.depth_func = depth_func
+        if cull is not None:
+            flags |= moderngl.CULL_FACE
+            ctx.cull_face = cull
+        if blend is not None:
+            flags |= moderngl.BLEND
+            ctx.blend_equation, ctx.blend_func = _BLENDS[blend]
+        ctx.enable_only(flags)
+        program.use()
+        array.render(mode, vertices=vertices, first=first, instances=instances)
+
+    @staticmethod
+    def _check_feedback(program: Program, fbo: moderngl.Framebuffer) -> None:
+        sampled = program.sampled()
+        for attachment in (*(fbo.color_attachments or ()), fbo.depth_attachment):
+            if attachment is not None and attachment.glo in sampled:
+                raise ShaderError(
+                    f"sampler '{sampled[attachment.glo]}' reads the texture that framebuffer '{fbo.extra or ''}' writes",
+                    where=program.label,
+                    remedy="write to another texture",
+                )
+
+    # -- measuring and manners ----------------------------------------------------------------------------------------
+
+    @property
+    def timing_enabled(self) -> bool:
+        """Whether `timer` measures; off at first."""
+        return self._timers.enabled
+
+    @timing_enabled.setter
+    def timing_enabled(self, on: bool) -> None:
+        self._timers.enabled = on
+
+    @property
+    def timer_kind(self) -> str:
+        """ "GPU query", or "wall clock" (around finish) on a software renderer."""
+        return self._timers.kind
+
+    @property
+    def timings(self) -> dict[str, float]:
+        """Name -> milliseconds, the latest measured; on a GPU a few frames old."""
+        return dict(self._timers.collect())
+
+    def timer(self, name: str) -> AbstractContextManager[None]:
+        """Time the body under a name; nests."""
+        measure: AbstractContextManager[None] = self._timers.measure(name)
+        return measure
+
+    def finish_timings(self) -> dict[str, float]:
+        """Wait for outstanding timer queries and return the timings."""
+        return dict(self._timers.collect(wait=True))
+
+    def guard_state(self) -> AbstractContextManager[None]:
+        """Within: a clean OpenGL state. After: the host's state as it was (framebuffers, viewport, program, vertex array,
+        textures and samplers by unit, blending, depth, culling, scissor, colour masks, pixel store, clip control)."""
+        self.make_current()
+        return guard_state(self.ctx, self.raw, self.info["max_texture_units"])
+
+    def check_error(self, where: str) -> None:
+        """Raise DeviceError when OpenGL has recorded an error."""
+        error = self.ctx.error
+        if error != "GL_NO_ERROR":
+            raise DeviceError(f"OpenGL reports {error}", where=where)
+
+
+def _info(ctx: moderngl.Context, raw: RawGL) -> dict[str, Any]:
+    names = ctx.info
+    return {
+        "renderer": names["GL_RENDERER"],
+        "vendor": names["GL_VENDOR"],
+        "version": names["GL_VERSION"],
+        "version_code": ctx.version_code,
+        "max_texture_size": raw.integer(0x0D33),
+        "max_cube_map_size": raw.integer(0x851C),
+        "max_array_layers": raw.integer(0x88FF),
+        "max_texture_units": raw.integer(0x8872),
+        "max_draw_buffers": raw.integer(0x8824),
+        "max_color_attachments": raw.integer(0x8CDF),
+        "max_viewport": list(raw.integers(0x0D3A, 2)),
+        "point_size_range": list(raw.floats(0x0B12, 2)),
+        "max_vertex_uniform_components": raw.integer(0x8B4A),
+        "max_fragment_uniform_components": raw.integer(0x8B49),
+        "max_uniform_block_bytes": raw.integer(0x8A30),
+        "max_vertex_attributes": raw.integer(0x8869),
+        "max_samples": raw.integer(0x8D57),
+    }

@@ -1,0 +1,177 @@
+"""Textures, framebuffers and buffers, each checked: an allocation that the driver refuses is an error, not a black image."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from glcaustics.errors import DeviceError, ResourceLimitError, UsageError
+from glcaustics.gpu.rawgl import RawGL
+
+_GL_TEXTURE_2D, _GL_TEXTURE0 = 0x0DE1, 0x84C0
+_GL_DEPTH_COMPONENT, _GL_FLOAT, _GL_DEPTH_COMPONENT32F = 0x1902, 0x1406, 0x8CAC
+_GL_SRGB8_ALPHA8 = 0x8C43
+
+
+@dataclass(frozen=True)
+class Format:
+    """How moderngl names a texture format, and its bytes per texel."""
+
+    components: int
+    dtype: str
+    bytes_per_texel: int
+    internal_format: int | None = None
+
+
+FORMATS: dict[str, Format] = {
+    "rgba32f": Format(4, "f4", 16),
+    "rg32f": Format(2, "f4", 8),
+    "r32f": Format(1, "f4", 4),
+    "rgba16f": Format(4, "f2", 8),
+    "rg16f": Format(2, "f2", 4),
+    "r16f": Format(1, "f2", 2),
+    "rgba8": Format(4, "f1", 4),
+    "srgba8": Format(4, "f1", 4, _GL_SRGB8_ALPHA8),
+    "r8": Format(1, "f1", 1),
+    "depth24": Format(1, "f4", 4),
+    "depth32f": Format(1, "f4", 4),
+}
+
+_NUMPY_TYPES = {"f1": np.uint8, "f2": np.float16, "f4": np.float32}
+
+
+@dataclass(frozen=True)
+class TextureInfo:
+    """Kept in `texture.extra` of every texture made here: what moderngl does not remember."""
+
+    label: str
+    format: str
+    compare: bool
+    bytes: int
+
+
+def make_texture(
+    ctx: moderngl.Context,
+    raw: RawGL,
+    max_size: int,
+    size: tuple[int, int],
+    format: str,
+    *,
+    filter: str,
+    compare: bool,
+    label: str,
+    data: Any,
+    repeat: bool,
+    mipmaps: bool,
+) -> moderngl.Texture:
+    """See `Device.texture`."""
+    name = f"texture '{label}'" if label else "texture"
+    if format not in FORMATS:
+        raise UsageError(f"{name}: format '{format}' is unknown", remedy=f"use one of {', '.join(FORMATS)}")
+    if filter not in ("nearest", "linear"):
+        raise UsageError(f"{name}: filter '{filter}' is unknown", remedy="use nearest or linear")
+    depth = format.startswith("depth")
+    if compare and not depth:
+        raise UsageError(f"{name}: depth compare asked of the colour format {format}", remedy="use depth24")
+    size = (int(size[0]), int(size[1]))
+    if min(size) < 1 or max(size) > max_size:
+        raise ResourceLimitError(
+            f"{name}: {size[0]} x {size[1]} texels, allowed are 1 to {max_size} a side",
+            remedy="ask for a smaller image or map size" if max(size) > max_size else "give a size of at least 1 x 1",
+        )
+    kind = FORMATS[format]
+    payload = None if data is None else _pixels(name, data, size, kind)
+    texture = _allocate(ctx, raw, name, size, format, payload)
+    texture.repeat_x = texture.repeat_y = repeat
+    mode = moderngl.LINEAR if filter == "linear" else moderngl.NEAREST
+    texture.filter = (mode, mode)
+    if depth:
+        texture.compare_func = "<=" if compare else ""
+    if mipmaps:
+        texture.build_mipmaps()
+        texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR if filter == "linear" else moderngl.NEAREST_MIPMAP_NEAREST, mode)
+    texture.extra = TextureInfo(label, format, compare, size[0] * size[1] * kind.bytes_per_texel)
+    _check_allocation(ctx, name, size, format, texture)
+    return texture
+
+
+def _pixels(name: str, data: Any, size: tuple[int, int], kind: Format) -> bytes:
+    """Bytes of the data, rows from v = 0 upwards; arrays are (H, W), (H, W, C) and are cast among float types only."""
+    if isinstance(data, (bytes, bytearray, memoryview)):
+        payload = bytes(data)
+    else:
+        array = np.asarray(data)
+        wanted = _NUMPY_TYPES[kind.dtype]
+        if (array.dtype == np.uint8) != (wanted is np.uint8):
+            raise UsageError(f"{name}: data of type {array.dtype} for a format of type {np.dtype(wanted)}", remedy="convert it first")
+        payload = np.ascontiguousarray(array, dtype=wanted).tobytes()
+    expected = size[0] * size[1] * kind.components * np.dtype(_NUMPY_TYPES[kind.dtype]).itemsize
+    if len(payload) != expected:
+        raise UsageError(
+            f"{name}: {len(payload)} bytes of data for {size[0]} x {size[1]} texels of {kind.components} components, "
+            f"which need {expected}",
+            remedy="give an array of shape (height, width, components)",
+        )
+    return payload
+
+
+def _allocate(
+    ctx: moderngl.Context, raw: RawGL, name: str, size: tuple[int, int], format: str, payload: bytes | None
+) -> moderngl.Texture:
+    ctx.clear_errors()
+    kind = FORMATS[format]
+    try:
+        if format == "depth24":
+            return ctx.depth_texture(size, payload)
+        if format == "depth32f":
+            # moderngl knows 24-bit depth only: take its texture and give it other storage.
+            texture = ctx.depth_texture(size)
+            raw.glActiveTexture(_GL_TEXTURE0 + ctx.default_texture_unit)
+            raw.glBindTexture(_GL_TEXTURE_2D, texture.glo)
+            raw.glTexImage2D(
+                _GL_TEXTURE_2D, 0, _GL_DEPTH_COMPONENT32F, *size, 0, _GL_DEPTH_COMPONENT, _GL_FLOAT, payload
+            )
+            return texture
+        return ctx.texture(size, kind.components, payload, dtype=kind.dtype, internal_format=kind.internal_format)
+    except moderngl.Error as error:
+        raise ResourceLimitError(f"{name}: {size[0]} x {size[1]} {format}: {error}") from error
+
+
+def _check_allocation(
+    ctx: moderngl.Context, name: str, size: tuple[int, int], format: str, texture: moderngl.Texture
+) -> None:
+    error = ctx.error
+    if error == "GL_NO_ERROR":
+        return
+    megabytes = size[0] * size[1] * FORMATS[format].bytes_per_texel / 1e6
+    texture.release()
+    raise ResourceLimitError(
+        f"{name}: the driver refused {size[0]} x {size[1]} {format}, {megabytes:.0f} MB ({error})",
+        remedy="ask for a smaller image or map size, or a lower quality",
+    )
+
+
+def make_framebuffer(
+    ctx: moderngl.Context, colors: Sequence[moderngl.Texture], depth: moderngl.Texture | None, label: str
+) -> moderngl.Framebuffer:
+    """See `Device.framebuffer`."""
+    name = f"framebuffer '{label}'" if label else "framebuffer"
+    attachments = [*colors, *([depth] if depth is not None else [])]
+    if not attachments:
+        raise DeviceError(f"{name} has no attachment")
+    sizes = {attachment.size for attachment in attachments}
+    if len(sizes) > 1:
+        listed = ", ".join(f"{a.extra.label if a.extra else a.glo} {a.size[0]} x {a.size[1]}" for a in attachments)
+        raise DeviceError(f"{name}: attachments differ in size: {listed}", remedy="give them one size")
+    try:
+        framebuffer = ctx.framebuffer(list(colors), depth)
+    except moderngl.Error as error:
+        raise DeviceError(f"{name}: {error}", remedy="the driver cannot render to one of these formats") from error
+    if ctx.error != "GL_NO_ERROR":
+        framebuffer.release()
+        raise DeviceError(f"{name} could not be made")
+    return framebuffer
