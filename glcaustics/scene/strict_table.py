@@ -1,4 +1,4 @@
-"""Strict reading of one TOML table: every key is asked for by name, with its type and range; what nobody asked for is an error."""
+"""Strict reading of TOML tables: each key is asked for by name, type and range; one that was not is an error."""
 
 from __future__ import annotations
 
@@ -57,9 +57,10 @@ class StrictTable:
     def _missing(self, key: str) -> SceneError:
         unknown = [k for k in self.data if k not in self._asked]
         close = difflib.get_close_matches(key, unknown, n=1, cutoff=0.5)
-        return self.error(f"'{key}' is missing", f"is '{close[0]}' meant to be '{key}'?" if close else f"add '{key} = ...'")
+        remedy = f"is '{close[0]}' meant to be '{key}'?" if close else f"add '{key} = ...'"
+        return self.error(f"'{key}' is missing", remedy)
 
-    def _get(self, key: str, default: Any, wanted: str) -> Any:
+    def _get(self, key: str, default: Any) -> Any:
         self._asked.add(key)
         if key in self.data:
             return self.data[key]
@@ -83,14 +84,14 @@ class StrictTable:
         self, key: str, default: Any = ..., *, low: float = -1e30, high: float = 1e30, above: float = -math.inf
     ) -> Any:
         """A finite number in [low, high] and greater than `above`; `default` when absent (`...`: required)."""
-        value = self._get(key, default, "a number")
+        value = self._get(key, default)
         if key not in self.data:
             return value
         return self._check_number(key, value, low, high, above)
 
     def integer(self, key: str, default: Any = ..., *, low: int, high: int) -> Any:
         """A whole number in [low, high]."""
-        value = self._get(key, default, "a whole number")
+        value = self._get(key, default)
         if key not in self.data:
             return value
         if isinstance(value, bool) or not isinstance(value, int):
@@ -101,14 +102,14 @@ class StrictTable:
 
     def boolean(self, key: str, default: Any = ...) -> Any:
         """`true` or `false`."""
-        value = self._get(key, default, "true or false")
+        value = self._get(key, default)
         if key in self.data and not isinstance(value, bool):
             raise self.error(f"'{key}' is {value!r}", "give true or false")
         return value
 
     def text(self, key: str, default: Any = ..., *, choices: Iterable[str] = ()) -> Any:
         """A string that is not empty, one of `choices` if they are given."""
-        value = self._get(key, default, "a string")
+        value = self._get(key, default)
         if key not in self.data:
             return value
         if not isinstance(value, str) or not value:
@@ -119,10 +120,17 @@ class StrictTable:
         return value
 
     def vector(
-        self, key: str, count: int, default: Any = ..., *, low: float = -1e30, high: float = 1e30, above: float = -math.inf
+        self,
+        key: str,
+        count: int,
+        default: Any = ...,
+        *,
+        low: float = -1e30,
+        high: float = 1e30,
+        above: float = -math.inf,
     ) -> Any:
         """A tuple of `count` numbers."""
-        value = self._get(key, default, f"{count} numbers")
+        value = self._get(key, default)
         if key not in self.data:
             return value
         if not isinstance(value, list) or len(value) != count:
@@ -131,7 +139,7 @@ class StrictTable:
 
     def integers(self, key: str, count: int, default: Any = ..., *, low: int, high: int) -> Any:
         """A tuple of `count` whole numbers in [low, high]."""
-        value = self._get(key, default, f"{count} whole numbers")
+        value = self._get(key, default)
         if key not in self.data:
             return value
         good = isinstance(value, list) and len(value) == count

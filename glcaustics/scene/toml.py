@@ -1,7 +1,7 @@
-"""Scene files in TOML: what glTF cannot carry (water, camera path, sky, method), and small scenes of procedural shapes.
+"""Scene files in TOML: what glTF cannot carry (water, camera path, sky, method), and scenes of procedural shapes.
 
-The reading is strict: an unknown key or table, a wrong type or a value out of range is a SceneError that names file, table,
-key, value and remedy. Lengths are metres, angles degrees where the key says `_deg`, colours linear RGB.
+The reading is strict: an unknown key or table, a wrong type or a value out of range is a SceneError that names file,
+table, key, value and remedy. Lengths are metres, angles degrees where the key says `_deg`, colours linear RGB.
 """
 
 from __future__ import annotations
@@ -56,7 +56,8 @@ def _override(data: dict[str, Any], key: str, value: Any, file: str) -> None:
         try:
             here = here[int(part)] if isinstance(here, list) else here[part]
         except (KeyError, IndexError, ValueError, TypeError):
-            raise SceneError(f"override '{key}': there is no '{part}'", where=file, remedy="name a table of the file") from None
+            what = f"override '{key}': there is no '{part}'"
+            raise SceneError(what, where=file, remedy="name a table of the file") from None
     if not isinstance(here, dict):
         raise SceneError(f"override '{key}' does not name a key of a table", where=file, remedy="write table[0].key")
     here[parts[-1]] = list(value) if isinstance(value, tuple) else value
@@ -150,7 +151,8 @@ def _read_keys(table: StrictTable, keys: list[StrictTable]) -> list[CameraKey]:
     for key in keys:
         frame = CameraKey(key.number("time_s"), *_eye_target(key), _yfov(key, default))
         if frames and frame.time_s <= frames[-1].time_s:
-            raise key.error(f"'time_s' is {frame.time_s:g}", f"it must be greater than the one before, {frames[-1].time_s:g}")
+            remedy = f"it must be greater than the one before, {frames[-1].time_s:g}"
+            raise key.error(f"'time_s' is {frame.time_s:g}", remedy)
         key.finish()
         frames.append(frame)
     return frames

@@ -6,11 +6,13 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from glcaustics.errors import SceneError
-from glcaustics.scene import shapes
+from glcaustics.scene import shapes, shapes_round
+from glcaustics.scene.mesh_tools import crease_normals, nondegenerate
 from glcaustics.scene.model import FloatArray, Instance, Material, Mesh
 from glcaustics.scene.strict_table import StrictTable, nearest
 
@@ -34,14 +36,14 @@ def _ring(name: str, table: StrictTable) -> Mesh:
     inner, outer = _positive(table, "inner_radius_m"), _positive(table, "outer_radius_m")
     if outer <= inner:
         raise table.error(f"'outer_radius_m' is {outer:g}", f"it must be greater than inner_radius_m = {inner:g}")
-    return shapes.ring(name, inner, outer, _positive(table, "height_m"), _segments(table, 256))
+    return shapes_round.ring(name, inner, outer, _positive(table, "height_m"), _segments(table, 256))
 
 
 def _torus(name: str, table: StrictTable) -> Mesh:
     radius, tube = _positive(table, "radius_m"), _positive(table, "tube_radius_m")
     if tube >= radius:
         raise table.error(f"'tube_radius_m' is {tube:g}", f"it must be smaller than radius_m = {radius:g}")
-    return shapes.torus(name, radius, tube, _segments(table, 96))
+    return shapes_round.torus(name, radius, tube, _segments(table, 96))
 
 
 # Shape name -> what reads its keys and builds it. The keys are the allowed ones, by being read.
@@ -51,15 +53,17 @@ SHAPES: Mapping[str, Callable[[str, StrictTable], Mesh]] = {
     "basin": lambda n, t: shapes.basin(n, _sizes(t, 3), _positive(t, "wall_m")),
     "frame": lambda n, t: shapes.frame(n, _sizes(t, 2), _positive(t, "width_m"), _positive(t, "height_m")),
     "stairs": lambda n, t: shapes.stairs(n, _sizes(t, 3), t.integer("steps", low=1, high=100)),
-    "sphere": lambda n, t: shapes.sphere(n, _positive(t, "radius_m"), _segments(t, 64)),
-    "icosphere": lambda n, t: shapes.icosphere(
+    "sphere": lambda n, t: shapes_round.sphere(n, _positive(t, "radius_m"), _segments(t, 64)),
+    "icosphere": lambda n, t: shapes_round.icosphere(
         n, _positive(t, "radius_m"), t.integer("subdivisions", 4, low=0, high=8)
     ),
-    "cylinder": lambda n, t: shapes.cylinder(n, _positive(t, "radius_m"), _positive(t, "height_m"), _segments(t, 64)),
-    "cone": lambda n, t: shapes.cone(n, _positive(t, "radius_m"), _positive(t, "height_m"), _segments(t, 64)),
+    "cylinder": lambda n, t: shapes_round.cylinder(
+        n, _positive(t, "radius_m"), _positive(t, "height_m"), _segments(t, 64)
+    ),
+    "cone": lambda n, t: shapes_round.cone(n, _positive(t, "radius_m"), _positive(t, "height_m"), _segments(t, 64)),
     "torus": _torus,
     "ring": _ring,
-    "half_cylinder": lambda n, t: shapes.half_cylinder(
+    "half_cylinder": lambda n, t: shapes_round.half_cylinder(
         n,
         _positive(t, "inner_radius_m"),
         _positive(t, "thickness_m"),
@@ -103,7 +107,7 @@ def load_mesh_file(path: Path) -> Mesh:
         kinds = ", ".join(MESH_FILES + GLTF_FILES)
         raise SceneError(f"mesh files of kind '{path.suffix}' are not read", where=str(path), remedy=f"use {kinds}")
     try:
-        loaded = trimesh.load(path, process=False, force="mesh")
+        loaded: Any = trimesh.load(path, process=False, force="mesh")
     except Exception as cause:  # trimesh lets every parser's own exceptions through
         raise SceneError(f"mesh cannot be read ({cause})", where=str(path), remedy="export it again") from cause
     positions, triangles = np.asarray(loaded.vertices, np.float64), np.asarray(loaded.faces)
@@ -111,12 +115,15 @@ def load_mesh_file(path: Path) -> Mesh:
         raise SceneError("mesh has no triangles", where=str(path), remedy="export it with faces")
     if not np.isfinite(positions).all():
         raise SceneError("mesh has a position that is not finite", where=str(path), remedy="repair the file")
-    cached = loaded._cache.cache.get("vertex_normals")  # there only if the file had them
-    normals = cached if cached is not None and np.shape(cached) == positions.shape else None
-    if normals is None:
-        normals = shapes.vertex_normals(positions, triangles)
+    triangles = triangles[nondegenerate(positions, triangles)]
     uv = getattr(loaded.visual, "uv", None)
     uv = np.zeros((len(positions), 2)) if uv is None or len(uv) != len(positions) else np.asarray(uv) * [1, -1] + [0, 1]
+    from_file = "vertex_normals" in loaded._cache  # trimesh's own way to tell; reading the property would compute them
+    normals = np.array(loaded.vertex_normals if from_file else np.zeros_like(positions), np.float64)
+    if not np.linalg.norm(normals, axis=1).all():
+        split = crease_normals(positions, triangles)
+        return shapes.make_mesh(path.stem, positions[split.source], split.normals, uv[split.source], split.triangles)
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     return shapes.make_mesh(path.stem, positions, normals, uv, triangles)
 
 

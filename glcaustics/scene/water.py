@@ -107,7 +107,7 @@ class WaveSurface:
         return [w.kx * x + w.kz * z - w.omega * time_s + w.phase for w in self.waves]
 
     def _displace(self, x: Array, z: Array, time_s: float) -> tuple[Array, Array, Array, list[Array]]:
-        """Displacement (dx, y, dz) of rest points and the Jacobian [xx, xz, zz, y_x, y_z] of (x, z) and y by (x0, z0)."""
+        """Displacement (dx, y, dz) of rest points; derivatives [xx, xz, zz, y_x, y_z] of (x, z), y by (x0, z0)."""
         dx, y, dz, xx, xz, zz, y_x, y_z = (np.zeros_like(x) for _ in range(8))
         xx, zz = xx + 1.0, zz + 1.0
         for wave, theta in zip(self.waves, self._thetas(x, z, time_s), strict=True):
@@ -179,8 +179,8 @@ class HeightMapSurface:
         self.size_m = size_m
         rows, columns = self.heights_m.shape
         self.step_m = (size_m[0] / (columns - 1), size_m[1] / (rows - 1))
-        slope_z, slope_x = np.gradient(self.heights_m, self.step_m[1], self.step_m[0], edge_order=2)
-        self.slope_x, self.slope_z = slope_x, slope_z
+        self.slope_x: Array = np.asarray(np.gradient(self.heights_m, self.step_m[0], axis=1, edge_order=2))
+        self.slope_z: Array = np.asarray(np.gradient(self.heights_m, self.step_m[1], axis=0, edge_order=2))
 
     def _bilinear(self, field: Array, x: Array, z: Array) -> Array:
         rows, columns = field.shape
@@ -194,7 +194,8 @@ class HeightMapSurface:
 
     def height(self, x: Array, z: Array, time_s: float = 0.0) -> Array:
         """Bilinear height above (x, z), metres; clamped to the border outside."""
-        return self._bilinear(self.heights_m, np.asarray(x, np.float64), np.asarray(z, np.float64))
+        x, z = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(z, np.float64))
+        return self._bilinear(self.heights_m, x, z)
 
     def gradient(self, x: Array, z: Array, time_s: float = 0.0) -> tuple[Array, Array]:
         """Blended central differences (dy/dx, dy/dz) at (x, z)."""
@@ -216,7 +217,9 @@ class WaterGrid:
     same Mesh object every time.
     """
 
-    def __init__(self, name: str, surface: WaterSurface, size_m: tuple[float, float], resolution: tuple[int, int]) -> None:
+    def __init__(
+        self, name: str, surface: WaterSurface, size_m: tuple[float, float], resolution: tuple[int, int]
+    ) -> None:
         nx, nz = resolution
         if not (2 <= nx <= MAX_GRID and 2 <= nz <= MAX_GRID):
             raise SceneError(
