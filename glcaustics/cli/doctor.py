@@ -19,6 +19,12 @@ EXTRAS = {"exr": "OpenEXR", "demo": "imgui_bundle", "bench": "mitsuba"}
 PACKAGES = ("moderngl", "glcontext", "glfw", "numpy", "pyrr", "trimesh", "Pillow")
 PROBE_TIMEOUT_S = 60.0
 
+# OpenGL 3.3 core alone is required; without these something small is missing.
+USEFUL_EXTENSIONS = {
+    "debug labels": ("GL_KHR_debug", "graphics debuggers show numbers for names"),
+    "timer queries": ("GL_ARB_timer_query", "passes are timed by the wall clock"),
+}
+
 
 def doctor_command(args: argparse.Namespace) -> int:
     """Prints the report; exit code 0 when at least one of the backends looked at works, else 2."""
@@ -26,7 +32,7 @@ def doctor_command(args: argparse.Namespace) -> int:
         backends = {args.backend: probe(args.backend)}
     else:
         backends = {name: _probe_apart(name) for name in BACKENDS[1:]}
-    report = {"machine": machine(), "extras": extras(), "backends": backends}
+    report = {"machine": machine(), "data": data_folders(), "extras": extras(), "backends": backends}
     print(json.dumps(report, indent=2) if args.json else _text(report))
     return 0 if any(found["works"] for found in backends.values()) else 2
 
@@ -39,6 +45,14 @@ def machine() -> dict[str, str]:
         "system": platform.platform(),
     }
     return versions | {name: importlib.metadata.version(name) for name in PACKAGES}
+
+
+def data_folders() -> dict[str, str]:
+    """Where the shaders and the built-in scenes are read from."""
+    from glcaustics.gpu import glsl_root
+    from glcaustics.scene.load import scenes_root
+
+    return {"shaders": str(glsl_root()), "scenes": str(scenes_root())}
 
 
 def extras() -> dict[str, dict[str, Any]]:
@@ -59,7 +73,8 @@ def probe(backend: str) -> dict[str, Any]:
     except GlcError as error:
         return {"works": False, "error": str(error)}
     try:
-        return {"works": True, "software": device.is_software, "info": dict(device.info)}
+        extensions = sorted(device.ctx.extensions)
+        return {"works": True, "software": device.is_software, "info": dict(device.info), "extensions": extensions}
     finally:
         device.close()
 
@@ -81,6 +96,8 @@ def _probe_apart(backend: str) -> dict[str, Any]:
 def _text(report: dict[str, Any]) -> str:
     lines = ["machine"]
     lines += [f"  {name:<12} {value}" for name, value in report["machine"].items()]
+    lines.append("data")
+    lines += [f"  {name:<12} {folder}" for name, folder in report["data"].items()]
     lines.append("extras")
     for name, extra in report["extras"].items():
         lines.append(f"  {name:<12} " + ("installed" if extra["installed"] else f"not installed; {extra['remedy']}"))
@@ -89,13 +106,21 @@ def _text(report: dict[str, Any]) -> str:
             lines += [f"backend {name}: does not work", f"  {found['error']}"]
             continue
         lines.append(f"backend {name}: works, {'software' if found['software'] else 'hardware'}")
-        lines += [f"  {key:<24} {_short(value)}" for key, value in found["info"].items()]
+        lines += [f"  {key:<32} {_short(value)}" for key, value in found["info"].items()]
+        for key, (extension, effect) in USEFUL_EXTENSIONS.items():
+            state = "yes" if extension in found["extensions"] else f"no: {effect}"
+            lines.append(f"  {key:<32} {state}")
+        lines.append(f"  {'extensions':<32} {len(found['extensions'])}, all of them with --json")
+    lines.append(_verdict(report["backends"]))
     return "\n".join(lines)
 
 
+def _verdict(backends: dict[str, Any]) -> str:
+    working = [name for name, found in backends.items() if found["works"]]
+    if working:
+        return f"ready: rendering works with --backend {' or '.join(working)}"
+    return "not ready: no backend gives OpenGL 3.3 core; the commands above mend it"
+
+
 def _short(value: Any) -> str:
-    if isinstance(value, dict):
-        return ", ".join(f"{key}={item}" for key, item in value.items())
-    if isinstance(value, (list, tuple, set)):
-        return ", ".join(str(item) for item in value)
-    return str(value)
+    return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
