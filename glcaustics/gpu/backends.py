@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import os
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -19,7 +20,7 @@ AUTO_ORDER = ("egl", "osmesa", "glfw")
 APT_REMEDY = {
     "egl": "apt-get install libegl1 libgl1 libgl1-mesa-dri",
     "osmesa": "apt-get install libosmesa6 libgl1 libgl1-mesa-dri",
-    "glfw": "run it in a desktop session, or: apt-get install xvfb libgl1 libgl1-mesa-dri libegl1; xvfb-run glcaustics ...",
+    "glfw": "run it in a desktop session, or: apt-get install xvfb libgl1 libgl1-mesa-dri, then xvfb-run ./run ...",
 }
 
 
@@ -50,21 +51,28 @@ def open_backend(name: str) -> Opened:
 
 
 def _open_egl() -> Opened:
-    ctx = moderngl.create_context(require=330, standalone=True, backend="egl")
+    settings: dict[str, Any] = {"backend": "egl"}
+    ctx = moderngl.create_context(require=330, standalone=True, **settings)
     return Opened(ctx, ctx.release)
 
 
 def _open_glfw() -> Opened:
     import glfw
 
-    if not glfw.init():
-        raise DeviceError("glfw found no display", remedy=APT_REMEDY["glfw"])
+    with warnings.catch_warnings(record=True) as caught:  # glfw reports its errors as warnings
+        warnings.simplefilter("always")
+        ready = glfw.init()
+    if not ready:
+        reason = "; ".join(str(w.message) for w in caught) or "no reason given"
+        raise DeviceError(f"glfw does not start: {reason}", remedy=APT_REMEDY["glfw"])
+    glfw.default_window_hints()
     glfw.window_hint(glfw.VISIBLE, False)
     glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
     glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
     glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
     glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
     window = glfw.create_window(16, 16, "glcaustics", None, None)
+    glfw.default_window_hints()
     if not window:
         raise DeviceError("glfw could open no window with OpenGL 3.3 core", remedy=APT_REMEDY["glfw"])
     glfw.make_context_current(window)
@@ -96,8 +104,19 @@ class OSMesaLoader:
         self._context = None
         for major, minor in ((4, 5), (4, 3), (3, 3)):
             attributes = (ctypes.c_int * 13)(
-                _OSMESA_FORMAT, _OSMESA_RGBA, _OSMESA_DEPTH_BITS, 24, _OSMESA_STENCIL_BITS, 8,
-                _OSMESA_PROFILE, _OSMESA_CORE_PROFILE, _OSMESA_MAJOR, major, _OSMESA_MINOR, minor, 0,
+                _OSMESA_FORMAT,
+                _OSMESA_RGBA,
+                _OSMESA_DEPTH_BITS,
+                24,
+                _OSMESA_STENCIL_BITS,
+                8,
+                _OSMESA_PROFILE,
+                _OSMESA_CORE_PROFILE,
+                _OSMESA_MAJOR,
+                major,
+                _OSMESA_MINOR,
+                minor,
+                0,
             )
             self._context = self._lib.OSMesaCreateContextAttribs(attributes, None)
             if self._context:
@@ -146,7 +165,8 @@ def osmesa_library() -> str | None:
 def _load_osmesa() -> ctypes.CDLL:
     name = osmesa_library()
     if name is None:
-        raise DeviceError("libOSMesa is not installed (Mesa 25.1 and later no longer has it)", remedy=APT_REMEDY["osmesa"])
+        what = "libOSMesa is not installed (Mesa 25.1 and later no longer has it)"
+        raise DeviceError(what, remedy=APT_REMEDY["osmesa"])
     lib = ctypes.CDLL(name, mode=ctypes.RTLD_GLOBAL)
     lib.OSMesaCreateContextAttribs.restype = ctypes.c_void_p
     lib.OSMesaCreateContextAttribs.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
@@ -161,7 +181,8 @@ def _load_osmesa() -> ctypes.CDLL:
 
 def _open_osmesa() -> Opened:
     loader = OSMesaLoader()
-    ctx = moderngl.create_context(require=330, context=loader)
+    settings: dict[str, Any] = {"context": loader}
+    ctx = moderngl.create_context(require=330, **settings)
 
     def close() -> None:
         ctx.release()

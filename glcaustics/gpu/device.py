@@ -11,55 +11,15 @@ import moderngl
 import numpy as np
 
 from glcaustics.errors import DeviceError, ResourceLimitError, ShaderError, UsageError
-from glcaustics.gpu.backends import APT_REMEDY, AUTO_ORDER, Opened, open_backend
+from glcaustics.gpu.backends import Opened
+from glcaustics.gpu.draw import draw
+from glcaustics.gpu.info import device_info, is_software
 from glcaustics.gpu.program import Program
 from glcaustics.gpu.rawgl import RawGL
-from glcaustics.gpu.shader_source import ShaderLoader
+from glcaustics.gpu.shader_source import ShaderLoader, define_text
 from glcaustics.gpu.state_guard import guard_state
-from glcaustics.gpu.texture import make_framebuffer, make_texture
+from glcaustics.gpu.texture import make_framebuffer, make_texture, read_texture
 from glcaustics.gpu.timer import Timers
-
-_SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "swrast", "software")
-_BLENDS = {
-    "add": (moderngl.FUNC_ADD, (moderngl.ONE, moderngl.ONE)),
-    "alpha": (moderngl.FUNC_ADD, (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA)),
-    "min": (moderngl.MIN, (moderngl.ONE, moderngl.ONE)),
-    "max": (moderngl.MAX, (moderngl.ONE, moderngl.ONE)),
-}
-
-
-def create_device(
-    backend: str = "auto", context: moderngl.Context | None = None, *, shader_root: Path | None = None
-) -> Device:
-    """Open a device, or wrap a host's context.
-
-    Args:
-        backend: "egl", "osmesa", "glfw" (a hidden window), or "auto", which tries them in that order and announces
-            the one it took and why the others failed.
-        context: a host's moderngl context, current; `backend` is then not used, and `close` leaves it alive.
-        shader_root: another folder of shaders than the project's own; for tests.
-
-    Raises:
-        DeviceError: nothing works; one line with the command that mends it.
-    """
-    if context is not None:
-        if context.version_code < 330:
-            raise DeviceError(f"the host's context has OpenGL {context.version_code / 100:.1f}, needed is 3.3 core")
-        return Device(Opened(context, lambda: None), "host", ["using the host's context"], shader_root)
-    if backend != "auto":
-        return Device(open_backend(backend), backend, [f"backend {backend}"], shader_root)
-    failures = []
-    for name in AUTO_ORDER:
-        try:
-            opened = open_backend(name)
-        except DeviceError as error:
-            failures.append(f"{name} failed: {error.what}")
-            continue
-        return Device(opened, name, [*failures, f"backend auto took {name}"], shader_root)
-    raise DeviceError(
-        f"no backend gives OpenGL 3.3 core ({'; '.join(failures)})",
-        remedy=f"on Debian or Ubuntu: {APT_REMEDY['egl']} libosmesa6; `glcaustics doctor` tells more",
-    )
 
 
 class Device:
@@ -80,9 +40,10 @@ class Device:
         self.backend = backend
         self.announcements = announcements
         self.raw = RawGL(self.ctx)
-        self.info = _info(self.ctx, self.raw)
-        self.is_software = any(word in self.info["renderer"].lower() for word in _SOFTWARE)
+        self.info = device_info(self.ctx, self.raw)
+        self.is_software = is_software(self.info["renderer"])
         self.closed = False
+        self._max_label = max((self.ctx.max_label_length or 0) - 1, 0)
         self._loader = ShaderLoader(shader_root)
         self._programs: dict[tuple[Any, ...], Program] = {}
         self._fullscreen: dict[Program, moderngl.VertexArray] = {}
@@ -159,6 +120,10 @@ class Device:
         self._label(texture, label)
         return texture
 
+    def read(self, texture: moderngl.Texture) -> np.ndarray:
+        """Texels of a texture made here: (H, W, C), or (H, W) with one component; float32 or uint8; row 0 is v = 0."""
+        return read_texture(texture)
+
     def framebuffer(
         self, colors: Sequence[moderngl.Texture] = (), depth: moderngl.Texture | None = None, label: str = ""
     ) -> moderngl.Framebuffer:
@@ -167,7 +132,6 @@ class Device:
         if len(colors) > limit:
             raise ResourceLimitError(f"framebuffer '{label}': {len(colors)} colour attachments, allowed are {limit}")
         framebuffer = make_framebuffer(self.ctx, colors, depth, label)
-        framebuffer.extra = label
         self._label(framebuffer, label)
         return framebuffer
 
@@ -181,16 +145,18 @@ class Device:
         self.ctx.clear_errors()
         buffer = self.ctx.buffer(payload, reserve=reserve, dynamic=dynamic)
         if self.ctx.error != "GL_NO_ERROR":
-            size = len(payload) if payload is not None else reserve
+            megabytes = (reserve if payload is None else len(payload)) / 1e6
             buffer.release()
-            raise ResourceLimitError(f"buffer '{label}': the driver refused {size / 1e6:.0f} MB", remedy="use a smaller mesh")
+            raise ResourceLimitError(
+                f"buffer '{label}': the driver refused {megabytes:.0f} MB", remedy="use a smaller mesh or fewer samples"
+            )
         buffer.extra = label
         self._label(buffer, label)
         return buffer
 
     def _label(self, thing: Any, label: str) -> None:
         if label and self.ctx.supports_labels:
-            thing.label = label[: max(self.ctx.max_label_length - 1, 0)]
+            thing.label = label[: self._max_label]
 
     # -- programs and drawing -----------------------------------------------------------------------------------------
 
@@ -213,12 +179,13 @@ class Device:
         Raises:
             ShaderError: with the file and line of the shader's own file.
         """
-        key = (path, tuple(sorted((defines or {}).items())), tuple(varyings), vertex)
+        texts = {name: define_text(path, name, value) for name, value in sorted((defines or {}).items())}
+        key = (path, tuple(texts.items()), tuple(varyings), vertex)
         program = self._programs.get(key)
         if program is None:
-            words = " ".join(f"{name}={value}" for name, value in sorted((defines or {}).items()))
+            words = " ".join(f"{name}={text}" for name, text in texts.items())
             label = f"{path} [{words}]" if words else path
-            source = self._loader.load(path, defines, vertex=vertex)
+            source = self._loader.load(path, texts, vertex=vertex)
             program = Program(self.ctx, source, label, tuple(varyings))
             self._label(program.gl, label)
             self._programs[key] = program
@@ -230,7 +197,7 @@ class Device:
         """Bind buffers to a program's inputs.
 
         Args:
-            content: tuples (buffer, moderngl format, name, ...), "3f 3f", "in_position", "in_normal"; per-instance "3f/i".
+            content: tuples (buffer, "3f 3f", "in_position", "in_normal"); per instance "3f/i".
             index_buffer: 32-bit unsigned indices.
 
         Raises:
@@ -240,7 +207,8 @@ class Device:
             for name in names:
                 if name not in program.source.attributes:
                     declared = ", ".join(sorted(program.source.attributes)) or "none"
-                    raise ShaderError(f"no vertex input '{name}'", where=program.label, remedy=f"declared are: {declared}")
+                    remedy = f"declared are: {declared}"
+                    raise ShaderError(f"no vertex input '{name}'", where=program.label, remedy=remedy)
         return self.ctx.vertex_array(program.gl, list(content), index_buffer, skip_errors=True)
 
     def draw_fullscreen(
@@ -285,35 +253,11 @@ class Device:
         Raises:
             ShaderError: a sampler without texture, or one whose texture is also drawn to.
         """
-        self._check_feedback(program, fbo)
-        ctx = self.ctx
-        fbo.viewport = viewport or (0, 0, *fbo.size)
-        fbo.depth_mask = depth_write
-        fbo.use()
-        flags = moderngl.PROGRAM_POINT_SIZE if point_size else moderngl.NOTHING
-        if depth_func is not None:
-            flags |= moderngl.DEPTH_TEST
-            ctx.depth_func = depth_func
-        if cull is not None:
-            flags |= moderngl.CULL_FACE
-            ctx.cull_face = cull
-        if blend is not None:
-            flags |= moderngl.BLEND
-            ctx.blend_equation, ctx.blend_func = _BLENDS[blend]
-        ctx.enable_only(flags)
-        program.use()
-        array.render(mode, vertices=vertices, first=first, instances=instances)
-
-    @staticmethod
-    def _check_feedback(program: Program, fbo: moderngl.Framebuffer) -> None:
-        sampled = program.sampled()
-        for attachment in (*(fbo.color_attachments or ()), fbo.depth_attachment):
-            if attachment is not None and attachment.glo in sampled:
-                raise ShaderError(
-                    f"sampler '{sampled[attachment.glo]}' reads the texture that framebuffer '{fbo.extra or ''}' writes",
-                    where=program.label,
-                    remedy="write to another texture",
-                )
+        draw(
+            self.ctx, array, program, fbo, mode=mode, vertices=vertices, instances=instances, first=first,
+            depth_func=depth_func, depth_write=depth_write, blend=blend, cull=cull, point_size=point_size,
+            viewport=viewport,
+        )  # fmt: skip
 
     # -- measuring and manners ----------------------------------------------------------------------------------------
 
@@ -346,8 +290,11 @@ class Device:
         return dict(self._timers.collect(wait=True))
 
     def guard_state(self) -> AbstractContextManager[None]:
-        """Within: a clean OpenGL state. After: the host's state as it was (framebuffers, viewport, program, vertex array,
-        textures and samplers by unit, blending, depth, culling, scissor, colour masks, pixel store, clip control)."""
+        """Within: a clean OpenGL state. After: the host's state as it was.
+
+        Framebuffers, viewport, scissor, program, vertex array, buffers, textures and samplers by unit, blending, depth,
+        culling, colour masks, pixel store, clip control, and moderngl's own copies of them.
+        """
         self.make_current()
         return guard_state(self.ctx, self.raw, self.info["max_texture_units"])
 
@@ -356,26 +303,3 @@ class Device:
         error = self.ctx.error
         if error != "GL_NO_ERROR":
             raise DeviceError(f"OpenGL reports {error}", where=where)
-
-
-def _info(ctx: moderngl.Context, raw: RawGL) -> dict[str, Any]:
-    names = ctx.info
-    return {
-        "renderer": names["GL_RENDERER"],
-        "vendor": names["GL_VENDOR"],
-        "version": names["GL_VERSION"],
-        "version_code": ctx.version_code,
-        "max_texture_size": raw.integer(0x0D33),
-        "max_cube_map_size": raw.integer(0x851C),
-        "max_array_layers": raw.integer(0x88FF),
-        "max_texture_units": raw.integer(0x8872),
-        "max_draw_buffers": raw.integer(0x8824),
-        "max_color_attachments": raw.integer(0x8CDF),
-        "max_viewport": list(raw.integers(0x0D3A, 2)),
-        "point_size_range": list(raw.floats(0x0B12, 2)),
-        "max_vertex_uniform_components": raw.integer(0x8B4A),
-        "max_fragment_uniform_components": raw.integer(0x8B49),
-        "max_uniform_block_bytes": raw.integer(0x8A30),
-        "max_vertex_attributes": raw.integer(0x8869),
-        "max_samples": raw.integer(0x8D57),
-    }

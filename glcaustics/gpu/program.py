@@ -81,9 +81,9 @@ class Program:
         """Set uniforms and samplers by name.
 
         Args:
-            **values: numbers, sequences and arrays; matrices in column-vector form (`M @ p`), shape (rows, columns), as float
-                arrays; samplers take a moderngl texture (arrays of samplers a sequence of them). A member of a uniform
-                struct or array of structs is set by its full name: `set(**{"u_lights[0].color": ...})`.
+            **values: numbers, sequences and arrays; matrices in column-vector form (`M @ p`), shape (rows, columns);
+                samplers take a moderngl texture (arrays of samplers a sequence of them). A member of a uniform struct
+                is set by its full name: `set(**{"u_lights[0].color": ...})`.
 
         Raises:
             ShaderError: the shader declares no such uniform, or the value does not fit its type. A uniform that is
@@ -116,7 +116,8 @@ class Program:
         for name, (unit, _, _) in self._units.items():
             textures = self._textures.get(name)
             if textures is None:
-                raise ShaderError(f"sampler '{name}' has no texture", where=self.label, remedy=f"call set({name}=texture)")
+                remedy = f"call set({name}=texture)"
+                raise ShaderError(f"sampler '{name}' has no texture", where=self.label, remedy=remedy)
             for i, texture in enumerate(textures):
                 if isinstance(texture.mglo, moderngl.InvalidObject):
                     raise ShaderError(f"the texture of sampler '{name}' was released", where=self.label)
@@ -161,7 +162,7 @@ class Program:
         return np.ascontiguousarray(array).tobytes()
 
     def _fit(self, name: str, slot: _Slot, array: np.ndarray) -> np.ndarray:
-        """An array shorter than the shader's leaves its tail at zero; a driver may also have cut the shader's unused tail."""
+        """A shorter array leaves the rest of the shader's at zero; a driver may have cut the shader's unused tail."""
         declared = self.source.array_lengths.get(name, slot.array_length)
         if declared is not None and len(array) > max(declared, slot.array_length):
             raise self._shape_error(name, slot, array)
@@ -171,8 +172,9 @@ class Program:
         return fitted
 
     def _shape_error(self, name: str, slot: _Slot, array: np.ndarray) -> ShaderError:
-        length = self.source.array_lengths.get(name)
-        wanted = f"{slot.glsl_type}[{length or slot.array_length}]" if name in self.source.array_lengths else slot.glsl_type
+        wanted = slot.glsl_type
+        if name in self.source.array_lengths:
+            wanted += f"[{self.source.array_lengths[name] or slot.array_length}]"
         return ShaderError(f"uniform '{name}' is {wanted} but the value has shape {array.shape}", where=self.label)
 
     def _set_texture(self, name: str, value: Any) -> None:
@@ -196,11 +198,9 @@ class Program:
         if parts and parts[0] in self.source.uniforms and all(part in self.source.identifiers for part in parts):
             return
         near = difflib.get_close_matches(name, sorted(self.source.uniforms), n=3, cutoff=0.4)
-        raise ShaderError(
-            f"no stage declares a uniform '{name}'",
-            where=self.label,
-            remedy=f"nearest: {', '.join(near)}" if near else f"declared are: {', '.join(sorted(self.source.uniforms)) or 'none'}",
-        )
+        declared = ", ".join(sorted(self.source.uniforms)) or "none"
+        remedy = f"nearest: {', '.join(near)}" if near else f"declared are: {declared}"
+        raise ShaderError(f"no stage declares a uniform '{name}'", where=self.label, remedy=remedy)
 
 
 def _base(name: str) -> str:
@@ -230,7 +230,7 @@ def _link(ctx: moderngl.Context, source: ShaderSource, label: str, varyings: tup
     except moderngl.Error as error:
         message = str(error)
         details = [line.strip() for line in message.splitlines() if "error" in line.lower()]
-        text = source.locate("\n".join(details)) or " ".join(message.split())
+        text = source.locate("\n".join(details[:5])) or " ".join(message.split())
         stage = _STAGE_IN_MESSAGE.search(message)
         what = f"{stage.group(1)} stage of {label} does not compile" if stage else f"{label} does not link"
         raise ShaderError(f"{what}: {text}", where=source.first_place(message)) from error

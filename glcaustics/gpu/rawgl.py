@@ -85,7 +85,9 @@ class RawGL:
         loader = getattr(ctx.mglo, "_context", None)
         load = getattr(loader, "load_opengl_function", None) or getattr(loader, "load", None)
         if load is None:
-            raise DeviceError("the moderngl context gives no access to its OpenGL loader", remedy="use moderngl 5.12 or later")
+            raise DeviceError(
+                "the moderngl context does not show its OpenGL loader", remedy="use moderngl 5.12 or later"
+            )
         self._load: Callable[[str], int] = load
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
@@ -93,7 +95,7 @@ class RawGL:
             raise AttributeError(name)
         address = self._load(name)
         if not address:
-            raise DeviceError(f"the OpenGL driver has no {name}", remedy="update the driver to OpenGL 3.3 core or later")
+            raise DeviceError(f"the OpenGL driver has no {name}", remedy="update it to OpenGL 3.3 core or later")
         function: Callable[..., Any] = ctypes.CFUNCTYPE(*_SIGNATURES[name])(address)
         setattr(self, name, function)
         return function

@@ -1,4 +1,4 @@
-"""GLSL files to compilable text: `#include`, defines, `#line`, and the way back from a driver's message to file and line.
+"""GLSL files to compilable text: `#include`, defines, `#line`, and back from a driver's message to file and line.
 
 Reads files only; no OpenGL, so that it is tested without a device.
 """
@@ -13,8 +13,8 @@ from pathlib import Path
 
 from glcaustics.errors import ShaderError
 
-#: `#line` directives carry the file's number in the line number too (file * stride + line): Mesa reports every source-string
-#: number as 0. Lines below the stride are the version line and the defines, files[0].
+#: `#line` directives carry the file's number in the line number too (file * stride + line): Mesa reports every
+#: source-string number as 0. Lines below the stride are the version line and the defines, files[0].
 LINE_STRIDE = 100_000
 DEFINES = "defines"
 VERSION_LINE = "#version 330 core"
@@ -28,6 +28,7 @@ _IDENTIFIER = re.compile(r"[A-Za-z_]\w*")
 _DECLARATION = re.compile(r"\b(uniform|in)\s+(?:(?:lowp|mediump|highp)\s+)?(\w+)\s+([^;{}()]+);")
 #: Mesa "0:12(5):", NVIDIA "0(12) :", Intel, AMD, Apple and ANGLE "ERROR: 0:12:".
 _PLACE = re.compile(r"^(?:(?:ERROR|WARNING): *)?(\d+)[:(](\d+)(?:\(\d+\))?\)? ?:", re.M)
+_DEFINED_NUMBER = re.compile(r"^\s*#\s*define\s+(\w+)\s+(\d+)\s*$", re.M)
 _DECLARATOR = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\[\s*(\w+)\s*\])?")
 _UNIFORM_BLOCK = re.compile(r"\buniform\s+(\w+)\s*\{")
 
@@ -99,12 +100,14 @@ class ShaderLoader:
     def __init__(self, root: Path | None = None) -> None:
         self.root = root or glsl_root()
 
-    def load(self, path: str, defines: Mapping[str, object] | None = None, *, vertex: str | None = None) -> ShaderSource:
+    def load(
+        self, path: str, defines: Mapping[str, object] | None = None, *, vertex: str | None = None
+    ) -> ShaderSource:
         """Read `<path>.vert`, `.geom` and `.frag`, as far as they exist.
 
         Args:
             path: relative to the root, without suffix ("passes/gbuffer/gbuffer").
-            defines: name -> value; they enter every stage as `#define NAME VALUE`, sorted. True and False become 1 and 0.
+            defines: name -> value; they enter every stage as `#define NAME VALUE`, sorted. True becomes 1, False 0.
             vertex: another vertex shader, relative to the root, with suffix. Without one and without `<path>.vert`,
                 the full-screen triangle is taken.
 
@@ -118,12 +121,13 @@ class ShaderLoader:
         if vertex or "vert" not in names:
             names = {"vert": vertex or FULLSCREEN_VERTEX, **{s: n for s, n in names.items() if s != "vert"}}
         source = ShaderSource({}, [DEFINES])
-        header = [VERSION_LINE] + [f"#define {name} {_literal(path, name, value)}" for name, value in sorted((defines or {}).items())]
+        texts = {name: define_text(path, name, value) for name, value in sorted((defines or {}).items())}
+        header = [VERSION_LINE, *(f"#define {name} {text}" for name, text in texts.items())]
         for suffix, name in names.items():
             body = _Assembly(self, source.files).file(name, "")
             source.stages[suffix] = "\n".join([*header, *body]) + "\n"
-            self._note_declarations(source, suffix, "\n".join(body))
-        for name in defines or {}:
+            self._note_declarations(source, suffix, "\n".join(body), texts)
+        for name in texts:
             if name not in source.identifiers:
                 near = difflib.get_close_matches(name, sorted(i for i in source.identifiers if i.isupper()), n=3)
                 raise ShaderError(
@@ -133,8 +137,9 @@ class ShaderLoader:
         return source
 
     @staticmethod
-    def _note_declarations(source: ShaderSource, suffix: str, body: str) -> None:
+    def _note_declarations(source: ShaderSource, suffix: str, body: str, defines: Mapping[str, str]) -> None:
         code = strip_comments(body)
+        numbers = {**dict(_DEFINED_NUMBER.findall(code)), **defines}
         source.identifiers.update(_IDENTIFIER.findall(code))
         for qualifier, kind, names in _DECLARATION.findall(code):
             target = source.uniforms if qualifier == "uniform" else source.attributes if suffix == "vert" else None
@@ -144,7 +149,8 @@ class ShaderLoader:
                     if found:
                         target[found[1]] = kind
                         if found[2] is not None and qualifier == "uniform":
-                            source.array_lengths[found[1]] = int(found[2]) if found[2].isdigit() else None
+                            length = str(numbers.get(found[2], found[2]))
+                            source.array_lengths[found[1]] = int(length) if length.isdigit() else None
         for name in _UNIFORM_BLOCK.findall(code):
             source.uniforms[name] = "block"
 
@@ -152,7 +158,8 @@ class ShaderLoader:
         """Text of one file. Raises ShaderError naming the place of the include and the nearest file."""
         file = self.root / name
         if not file.is_file():
-            raise ShaderError(f"'{name}' does not exist under {self.root}", where=included_from, remedy=self._nearest(name))
+            what = f"'{name}' does not exist under {self.root}"
+            raise ShaderError(what, where=included_from, remedy=self._nearest(name))
         return file.read_text(encoding="utf-8")
 
     def _nearest(self, name: str) -> str:
@@ -176,7 +183,8 @@ class _Assembly:
         """Lines of a file with its includes expanded, beginning with its `#line` directive."""
         if name in self._stack:
             loop = " -> ".join([*self._stack[self._stack.index(name) :], name])
-            raise ShaderError(f"circular include: {loop}", where=included_from, remedy="move what both need to a third file")
+            remedy = "move what both need to a third file"
+            raise ShaderError(f"circular include: {loop}", where=included_from, remedy=remedy)
         text = self._loader.read(name, included_from)
         if name not in self._files:
             self._files.append(name)
@@ -186,7 +194,8 @@ class _Assembly:
         self._stack.append(name)
         lines = [_line_directive(1, number)]
         depth = 0
-        for line_number, (line, code) in enumerate(zip(text.split("\n"), strip_comments(text).split("\n"), strict=True), 1):
+        pairs = zip(text.split("\n"), strip_comments(text).split("\n"), strict=True)
+        for line_number, (line, code) in enumerate(pairs, 1):
             directive = _CONDITIONAL.match(code)
             if directive:
                 depth += -1 if directive.group(1) == "endif" else 1
@@ -203,7 +212,7 @@ class _Assembly:
     def _include(self, operand: str, where: str, conditional: bool) -> list[str]:
         path = _INCLUDE_PATH.match(operand)
         if not path:
-            raise ShaderError(f"#include{operand} is not of the form #include \"folder/file.glsl\"", where=where)
+            raise ShaderError(f'#include{operand} is not of the form #include "folder/file.glsl"', where=where)
         target = path.group(1)
         if target in self._surely_included and target not in self._stack:
             return []
@@ -215,11 +224,13 @@ def _line_directive(line: int, number: int) -> str:
     return f"#line {number * LINE_STRIDE + line} {number}"
 
 
-def _literal(path: str, name: str, value: object) -> str:
+def define_text(path: str, name: str, value: object) -> str:
+    """Text of a define's value. Raises ShaderError when it is neither a number nor a one-line string."""
     if not _IDENTIFIER.fullmatch(name):
         raise ShaderError(f"'{name}' cannot be the name of a define of '{path}'")
     if isinstance(value, bool):
         return str(int(value))
     if isinstance(value, (int, float, str)) and "\n" not in str(value):
         return str(value)
-    raise ShaderError(f"the define {name} of '{path}' has the value {value!r}", remedy="use a number or a one-line string")
+    remedy = "use a number or a one-line string"
+    raise ShaderError(f"the define {name} of '{path}' has the value {value!r}", remedy=remedy)

@@ -1,4 +1,4 @@
-"""Textures, framebuffers and buffers, each checked: an allocation that the driver refuses is an error, not a black image."""
+"""Textures, framebuffers and buffers, each checked: a refused allocation is an error, not a black image."""
 
 from __future__ import annotations
 
@@ -54,6 +54,13 @@ class TextureInfo:
     bytes: int
 
 
+@dataclass(frozen=True)
+class FramebufferInfo:
+    """Kept in `framebuffer.extra` of every framebuffer made here; its absence marks one of the host's."""
+
+    label: str
+
+
 def make_texture(
     ctx: moderngl.Context,
     raw: RawGL,
@@ -93,7 +100,8 @@ def make_texture(
         texture.compare_func = "<=" if compare else ""
     if mipmaps:
         texture.build_mipmaps()
-        texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR if filter == "linear" else moderngl.NEAREST_MIPMAP_NEAREST, mode)
+        minify = moderngl.LINEAR_MIPMAP_LINEAR if filter == "linear" else moderngl.NEAREST_MIPMAP_NEAREST
+        texture.filter = (minify, mode)
     texture.extra = TextureInfo(label, format, compare, size[0] * size[1] * kind.bytes_per_texel)
     _check_allocation(ctx, name, size, format, texture)
     return texture
@@ -107,7 +115,7 @@ def _pixels(name: str, data: Any, size: tuple[int, int], kind: Format) -> bytes:
         array = np.asarray(data)
         wanted = _NUMPY_TYPES[kind.dtype]
         if (array.dtype == np.uint8) != (wanted is np.uint8):
-            raise UsageError(f"{name}: data of type {array.dtype} for a format of type {np.dtype(wanted)}", remedy="convert it first")
+            raise UsageError(f"{name}: data is {array.dtype}, the format {np.dtype(wanted)}", remedy="convert it first")
         payload = np.ascontiguousarray(array, dtype=wanted).tobytes()
     expected = size[0] * size[1] * kind.components * np.dtype(_NUMPY_TYPES[kind.dtype]).itemsize
     if len(payload) != expected:
@@ -174,4 +182,13 @@ def make_framebuffer(
     if ctx.error != "GL_NO_ERROR":
         framebuffer.release()
         raise DeviceError(f"{name} could not be made")
+    framebuffer.extra = FramebufferInfo(label)
     return framebuffer
+
+
+def read_texture(texture: moderngl.Texture) -> np.ndarray:
+    """See `Device.read`."""
+    array = np.frombuffer(texture.read(), _NUMPY_TYPES[texture.dtype])
+    width, height = texture.size
+    shape = (height, width) if texture.components == 1 else (height, width, texture.components)
+    return array.reshape(shape).astype(np.float32 if texture.dtype == "f2" else array.dtype)

@@ -36,7 +36,7 @@ class FrameGraph:
 
     def _check_name(self, name: str) -> None:
         if any(decl.name == name for decl in self._decls) or any(left.name == name for left, _ in self._left_out):
-            raise GraphError(f"two passes are called '{name}'", remedy="give each a name of its own, such as 'name@light'")
+            raise GraphError(f"two passes are called '{name}'", remedy="give each its own name, such as 'name@light'")
 
     def compile(self, outputs: Sequence[str]) -> Plan:
         """Choose, order and allocate.
@@ -97,7 +97,8 @@ class FrameGraph:
                     raise self._unknown(resource, f"pass '{decl.name}' reads '{resource}', which", writer)
             for resource in decl.history:
                 if resource not in writer:
-                    raise self._unknown(resource, f"pass '{decl.name}' reads the history of '{resource}', which", writer)
+                    subject = f"pass '{decl.name}' reads the history of '{resource}', which"
+                    raise self._unknown(resource, subject, writer)
 
     def _unknown(self, resource: str, subject: str, writer: Mapping[str, PassDecl]) -> GraphError:
         for left, writes in self._left_out:
@@ -188,9 +189,7 @@ def _flood(outputs: Sequence[str], writer: Mapping[str, PassDecl]) -> tuple[set[
 
 
 def _culled(decl: PassDecl, decls: Sequence[PassDecl]) -> LeftOut:
-    readers = [
-        other.name for other in decls if set((*other.reads, *other.optional, *other.history)) & set(decl.writes)
-    ]
+    readers = [other.name for other in decls if set((*other.reads, *other.optional, *other.history)) & set(decl.writes)]
     memory = sum(desc.bytes() for desc in decl.writes.values())
     if not decl.writes:
         return LeftOut(decl.name, "it writes nothing", memory)
@@ -217,8 +216,14 @@ def _assign_slots(steps: Sequence[Step], persistent: set[str]) -> tuple[dict[str
             desc = step.decl.writes[resource]
             slot = None
             if resource not in persistent:
-                slot = next((s for s, free in enumerate(free_from)
-                             if 0 <= free <= i and descs[s].allocation_key() == desc.allocation_key()), None)
+                slot = next(
+                    (
+                        s
+                        for s, free in enumerate(free_from)
+                        if 0 <= free <= i and descs[s].allocation_key() == desc.allocation_key()
+                    ),
+                    None,
+                )
             if slot is None:
                 slot = len(descs)
                 descs.append(desc)

@@ -35,12 +35,14 @@ def _rows(plan: Plan) -> list[tuple[str, str, str, str]]:
         writes = [f"{r}: {_texture(step.decl.writes[r])}" for r in step.live_writes]
         writes += [f"({r}: unread, not allocated)" for r in step.decl.writes if r not in step.live_writes]
         for i in range(max(len(reads), len(writes))):
-            rows.append((
-                step.name if i == 0 else "",
-                "runs" if i == 0 else "",
-                reads[i] if i < len(reads) else "",
-                writes[i] if i < len(writes) else "",
-            ))
+            rows.append(
+                (
+                    step.name if i == 0 else "",
+                    "runs" if i == 0 else "",
+                    reads[i] if i < len(reads) else "",
+                    writes[i] if i < len(writes) else "",
+                )
+            )
     return rows
 
 
@@ -65,36 +67,42 @@ def explain(plan: Plan) -> str:
     lines += [
         "",
         f"{len(plan.steps)} passes run, {len(plan.left_out)} left out; outputs: {', '.join(plan.outputs)}",
-        f"memory: {megabytes(plan.bytes_allocated)} in {len(plan.slot_descs)} textures; saved by leaving out what nobody "
-        f"reads: {megabytes(culled)}; saved by sharing textures: {megabytes(aliased)}",
+        f"memory: {megabytes(plan.bytes_allocated)} in {len(plan.slot_descs)} textures; "
+        f"saved by leaving out what nobody reads: {megabytes(culled)}; by sharing textures: {megabytes(aliased)}",
     ]
     return "\n".join(lines)
 
 
-def _quote(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
-
-
 def to_dot(plan: Plan) -> str:
-    """Passes as boxes, resources as ellipses, left-out passes dashed. Draw it with `dot -Tsvg`."""
+    """Passes as boxes, resources as ellipses (outputs bold), left-out passes dashed. Draw it with `dot -Tsvg`."""
     lines = ["digraph frame {", "  rankdir=LR;", "  node [fontname=Helvetica, fontsize=10];"]
     for step in plan.steps:
-        lines.append(f"  {_quote('pass ' + step.name)} [label={_quote(step.name)}, shape=box, style=filled, fillcolor=lightblue];")
-        for resource in step.live_writes:
-            desc = step.decl.writes[resource]
-            label = f"{resource}\\n{desc.format} {desc.size[0]}x{desc.size[1]}"
-            bold = ", penwidth=3" if resource in plan.outputs else ""
-            lines.append(f'  {_quote(resource)} [label="{label}", shape=ellipse{bold}];')
-            lines.append(f"  {_quote('pass ' + step.name)} -> {_quote(resource)};")
-        for resource in step.decl.reads:
-            lines.append(f"  {_quote(resource)} -> {_quote('pass ' + step.name)};")
-        for resource in step.present_optional:
-            lines.append(f"  {_quote(resource)} -> {_quote('pass ' + step.name)} [style=dashed];")
-        for resource in step.decl.history:
-            lines.append(
-                f"  {_quote(resource)} -> {_quote('pass ' + step.name)} [style=dotted, constraint=false, label=\"previous frame\"];"
-            )
+        lines += _dot_step(plan, step)
     for left in plan.left_out:
-        label = f"{left.name}\nleft out: {left.because}"
-        lines.append(f"  {_quote('pass ' + left.name)} [label={_quote(label)}, shape=box, style=dashed, color=gray];".replace("\n", "\\n"))
+        label = _quote(f"{left.name}\nleft out: {left.because}")
+        lines.append(f"  {_node(left.name)} [label={label}, shape=box, style=dashed, color=gray];")
     return "\n".join([*lines, "}"]) + "\n"
+
+
+def _dot_step(plan: Plan, step: Step) -> list[str]:
+    node = _node(step.name)
+    lines = [f"  {node} [label={_quote(step.name)}, shape=box, style=filled, fillcolor=lightblue];"]
+    for resource in step.live_writes:
+        desc = step.decl.writes[resource]
+        label = _quote(f"{resource}\n{desc.format} {desc.size[0]}x{desc.size[1]}")
+        bold = ", penwidth=3" if resource in plan.outputs else ""
+        lines += [f"  {_quote(resource)} [label={label}, shape=ellipse{bold}];", f"  {node} -> {_quote(resource)};"]
+    lines += [f"  {_quote(resource)} -> {node};" for resource in step.decl.reads]
+    lines += [f"  {_quote(resource)} -> {node} [style=dashed];" for resource in step.present_optional]
+    for resource in step.decl.history:
+        lines.append(f'  {_quote(resource)} -> {node} [style=dotted, constraint=false, label="previous frame"];')
+    return lines
+
+
+def _node(name: str) -> str:
+    return _quote(f"pass {name}")
+
+
+def _quote(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'

@@ -49,7 +49,8 @@ class TextureDesc:
 
     def __post_init__(self) -> None:
         if self.format not in FORMAT_BYTES:
-            raise GraphError(f"texture format '{self.format}' is unknown", remedy=f"use one of {', '.join(FORMAT_BYTES)}")
+            remedy = f"use one of {', '.join(FORMAT_BYTES)}"
+            raise GraphError(f"texture format '{self.format}' is unknown", remedy=remedy)
         if self.filter not in FILTERS:
             raise GraphError(f"texture filter '{self.filter}' is unknown", remedy="use nearest or linear")
         if len(self.size) != 2 or min(self.size) < 1:
