@@ -2,8 +2,8 @@
 
     python scenes/glass-bunny/make_bunny.py
 
-The shape is a smooth union of ellipsoids and tapered capsules; it is meshed by surface nets (Gibson 1998), its vertices are
-pulled onto the surface, and its normals are the field's gradient.
+The shape is a smooth union of ellipsoids and tapered capsules; it is meshed by surface nets (Gibson 1998), its vertices
+are pulled onto the surface, and its normals are the field's gradient.
 """
 
 from __future__ import annotations
