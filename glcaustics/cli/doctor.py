@@ -13,28 +13,24 @@ from typing import Any
 
 import glcaustics
 from glcaustics.cli.parser import BACKENDS
-from glcaustics.errors import GlcError
 
 EXTRAS = {"exr": "OpenEXR", "demo": "imgui_bundle", "bench": "mitsuba"}
 PACKAGES = ("moderngl", "glcontext", "glfw", "numpy", "pyrr", "trimesh", "Pillow")
 PROBE_TIMEOUT_S = 60.0
 
-# OpenGL 3.3 core alone is required; without these something small is missing.
-USEFUL_EXTENSIONS = {
-    "debug labels": ("GL_KHR_debug", "graphics debuggers show numbers for names"),
-    "timer queries": ("GL_ARB_timer_query", "passes are timed by the wall clock"),
-}
-
 
 def doctor_command(args: argparse.Namespace) -> int:
     """Prints the report; exit code 0 when at least one of the backends looked at works, else 2."""
+    from glcaustics.gpu.doctor import probe_backend, system_libraries
+
     if args.backend:
-        backends = {args.backend: probe(args.backend)}
+        backends = {args.backend: probe_backend(args.backend)}
     else:
         backends = {name: _probe_apart(name) for name in BACKENDS[1:]}
-    report = {"machine": machine(), "data": data_folders(), "extras": extras(), "backends": backends}
+    report = {"machine": machine(), "data": data_folders(), "extras": extras()}
+    report |= {"libraries": system_libraries(), "backends": backends}
     print(json.dumps(report, indent=2) if args.json else _text(report))
-    return 0 if any(found["works"] for found in backends.values()) else 2
+    return 0 if any(map(_usable, backends.values())) else 2
 
 
 def machine() -> dict[str, str]:
@@ -64,23 +60,8 @@ def extras() -> dict[str, dict[str, Any]]:
     return found
 
 
-def probe(backend: str) -> dict[str, Any]:
-    """Opens a context in this process: {"works": True, "info": {...}} or {"works": False, "error": ...}."""
-    try:
-        from glcaustics.gpu import create_device
-
-        device = create_device(backend)
-    except GlcError as error:
-        return {"works": False, "error": str(error)}
-    try:
-        extensions = sorted(device.ctx.extensions)
-        return {"works": True, "software": device.is_software, "info": dict(device.info), "extensions": extensions}
-    finally:
-        device.close()
-
-
 def _probe_apart(backend: str) -> dict[str, Any]:
-    """`probe` in its own process: two Mesa front ends in one can crash, and a crash must not end the report."""
+    """`probe_backend` in its own process: two Mesa front ends in one can crash, and a crash must not end the report."""
     command = [sys.executable, "-m", "glcaustics", "doctor", "--backend", backend, "--json"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=PROBE_TIMEOUT_S, check=False)
@@ -101,25 +82,38 @@ def _text(report: dict[str, Any]) -> str:
     lines.append("extras")
     for name, extra in report["extras"].items():
         lines.append(f"  {name:<12} " + ("installed" if extra["installed"] else f"not installed; {extra['remedy']}"))
+    lines.append("system libraries")
+    for name, library in report["libraries"].items():
+        lines.append(f"  {name:<12} {library['found'] or 'missing; ' + library['remedy']}")
     for name, found in report["backends"].items():
-        if not found["works"]:
-            lines += [f"backend {name}: does not work", f"  {found['error']}"]
-            continue
-        lines.append(f"backend {name}: works, {'software' if found['software'] else 'hardware'}")
-        lines += [f"  {key:<32} {_short(value)}" for key, value in found["info"].items()]
-        for key, (extension, effect) in USEFUL_EXTENSIONS.items():
-            state = "yes" if extension in found["extensions"] else f"no: {effect}"
-            lines.append(f"  {key:<32} {state}")
-        lines.append(f"  {'extensions':<32} {len(found['extensions'])}, all of them with --json")
+        lines += _backend_lines(name, found)
     lines.append(_verdict(report["backends"]))
     return "\n".join(lines)
 
 
+def _backend_lines(name: str, found: dict[str, Any]) -> list[str]:
+    if not found["works"]:
+        return [f"backend {name}: does not work", f"  {found['error']}"]
+    rows = {"additive 32-bit float blending": _yes(found["float_blend_measured"])}
+    for key, value in found["info"].items():
+        rows |= {k: _yes(v) for k, v in value.items()} if key == "features" else {key: _short(value)}
+    head = f"backend {name}: works, {'software' if found['software'] else 'hardware'}"
+    return [head, *(f"  {key:<32} {value}" for key, value in rows.items())]
+
+
+def _usable(found: dict[str, Any]) -> bool:
+    return bool(found["works"] and found["float_blend_measured"])
+
+
 def _verdict(backends: dict[str, Any]) -> str:
-    working = [name for name, found in backends.items() if found["works"]]
-    if working:
-        return f"ready: rendering works with --backend {' or '.join(working)}"
-    return "not ready: no backend gives OpenGL 3.3 core; the commands above mend it"
+    usable = [name for name, found in backends.items() if _usable(found)]
+    if usable:
+        return f"ready: rendering works with --backend {' or '.join(usable)}"
+    return "not ready: no backend gives OpenGL 3.3 core with float blending; the commands above mend it"
+
+
+def _yes(there: bool) -> str:
+    return "yes" if there else "no"
 
 
 def _short(value: Any) -> str:

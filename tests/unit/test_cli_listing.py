@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -73,7 +74,12 @@ def test_scenes_lists_every_built_in_scene_with_its_licence(capsys: pytest.Captu
         assert purpose in out and f"licence: {licence}" in out
 
 
-WORKS = {"works": True, "software": True, "info": {"renderer": "llvmpipe"}, "extensions": ["GL_KHR_debug"]}
+WORKS = {
+    "works": True,
+    "software": True,
+    "float_blend_measured": True,
+    "info": {"renderer": "llvmpipe", "max_viewport": [64, 64], "features": {"compute shaders": False}},
+}
 FAILS = {"works": False, "error": "backend 'glfw' gave no context; apt-get install xvfb"}
 
 
@@ -84,12 +90,14 @@ def test_doctor_tells_what_works_and_what_mends_the_rest(
     assert cli.main(["doctor"]) == 0
     out = capsys.readouterr().out
     assert "backend egl: works, software" in out
+    assert re.search(r"compute shaders +no$", out, re.MULTILINE)
     assert "apt-get install xvfb" in out
     assert out.endswith("ready: rendering works with --backend egl\n")
 
 
 def test_doctor_exits_2_when_nothing_works(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "_probe_apart", lambda backend: FAILS)
+    no_blending = WORKS | {"float_blend_measured": False}
+    monkeypatch.setattr(doctor, "_probe_apart", lambda backend: no_blending if backend == "egl" else FAILS)
     assert cli.main(["doctor", "--json"]) == 2
     backends = json.loads(capsys.readouterr().out)["backends"]
     assert set(backends) == {"egl", "osmesa", "glfw"}
