@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -47,6 +47,7 @@ class Device:
         self._loader = ShaderLoader(shader_root)
         self._programs: dict[tuple[Any, ...], Program] = {}
         self._fullscreen: dict[Program, moderngl.VertexArray] = {}
+        self._rest: moderngl.Framebuffer | None = None
         self._timers = Timers(self.ctx, self.raw, self.is_software)
         self.check_error("opening the device")
 
@@ -135,6 +136,14 @@ class Device:
         self._label(framebuffer, label)
         return framebuffer
 
+    def release_framebuffers(self, framebuffers: Iterable[moderngl.Framebuffer]) -> None:
+        """Release framebuffers of which one may be bound: moderngl rebinds the bound one later, released or not."""
+        if self._rest is None:
+            self._rest = self.framebuffer([self.texture((1, 1), "rgba8", label="rest")], label="rest")
+        self._rest.use()
+        for framebuffer in framebuffers:
+            framebuffer.release()
+
     def buffer(self, data: Any = None, label: str = "", *, reserve: int = 0, dynamic: bool = False) -> moderngl.Buffer:
         """A buffer of bytes or a NumPy array, or of `reserve` bytes. Raises ResourceLimitError when memory is out."""
         if data is None and reserve < 1:
@@ -221,13 +230,22 @@ class Device:
             array = self._fullscreen[program] = self.ctx.vertex_array(program.gl, [])
         self.draw(array, program, fbo, vertices=3, blend=blend, viewport=viewport)
 
+    def draw_points(
+        self, program: Program, fbo: moderngl.Framebuffer, count: int, *, blend: str | None = None
+    ) -> None:
+        """`count` points without any vertex buffer: the vertex shader goes by `gl_VertexID` and sets `gl_PointSize`."""
+        array = self._fullscreen.get(program)
+        if array is None:
+            array = self._fullscreen[program] = self.ctx.vertex_array(program.gl, [])
+        self.draw(array, program, fbo, mode="points", vertices=count, blend=blend, point_size=True)
+
     def draw(
         self,
         array: moderngl.VertexArray,
         program: Program,
         fbo: moderngl.Framebuffer,
         *,
-        mode: int = moderngl.TRIANGLES,
+        mode: str = "triangles",
         vertices: int = -1,
         instances: int = 1,
         first: int = 0,
@@ -241,7 +259,7 @@ class Device:
         """Draw with exactly the state that is named here; nothing carries over from an earlier draw.
 
         Args:
-            mode: moderngl primitive mode.
+            mode: "triangles", "triangle_strip", "points", "lines" or "line_strip".
             vertices, instances, first: as in moderngl; -1 vertices = all.
             depth_func: "<", "<=", ">", ">=", "==", "1" (always), or None for no depth test and no depth write.
             depth_write: with a depth test, whether depth is written.

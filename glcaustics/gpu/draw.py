@@ -12,6 +12,13 @@ from glcaustics.errors import ShaderError, UsageError
 from glcaustics.gpu.program import Program
 from glcaustics.gpu.texture import FramebufferInfo
 
+_MODES = {
+    "triangles": moderngl.TRIANGLES,
+    "triangle_strip": moderngl.TRIANGLE_STRIP,
+    "points": moderngl.POINTS,
+    "lines": moderngl.LINES,
+    "line_strip": moderngl.LINE_STRIP,
+}
 _BLENDS = {
     "add": ((moderngl.FUNC_ADD,) * 2, (moderngl.ONE, moderngl.ONE)),
     "alpha": ((moderngl.FUNC_ADD,) * 2, (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA)),
@@ -26,7 +33,7 @@ def draw(
     program: Program,
     fbo: moderngl.Framebuffer,
     *,
-    mode: int,
+    mode: str,
     vertices: int,
     instances: int,
     first: int,
@@ -38,12 +45,14 @@ def draw(
     viewport: tuple[int, int, int, int] | None,
 ) -> None:
     """See `Device.draw`."""
+    if mode not in _MODES:
+        raise UsageError(f"primitive mode '{mode}' is unknown", remedy=f"use one of {', '.join(_MODES)}")
     _check_feedback(program, fbo)
     with _framebuffer_state(fbo, viewport or (0, 0, *fbo.size), depth_write):
         fbo.use()
         ctx.enable_only(_set_state(ctx, depth_func, blend, cull, point_size))
         program.use()
-        array.render(mode, vertices=vertices, first=first, instances=instances)
+        array.render(_MODES[mode], vertices=vertices, first=first, instances=instances)
 
 
 @contextmanager
@@ -56,12 +65,15 @@ def _framebuffer_state(fbo: Any, viewport: tuple[int, int, int, int], depth_writ
     fbo.scissor = None
     fbo.viewport = viewport
     fbo.depth_mask = depth_write
-    fbo.color_mask = [(True,) * 4] * len(kept[2]) if several else (True,) * 4
+    if kept[2]:  # a depth-only framebuffer has none to set
+        fbo.color_mask = [(True,) * 4] * len(kept[2]) if several else (True,) * 4
     try:
         yield
     finally:
         fbo.scissor = scissor
-        fbo.viewport, fbo.depth_mask, fbo.color_mask = kept
+        fbo.viewport, fbo.depth_mask = kept[:2]
+        if kept[2]:
+            fbo.color_mask = kept[2]
 
 
 def _set_state(

@@ -2,12 +2,10 @@
 // C = sigma^2 x mean of the outer products of the one-sided differences of the landing points (for an affine map sigma^2 J J^T), plus
 // the map's own pixel filter (Zwicker et al. 2001, EWA splatting, eq. 14: the sum of both covariances). Two one-sided differences rather
 // than a central one: at a fold they cancel, though the light is spread.
-#include "interface/caster_view.glsl"
 #include "interface/receiver_view.glsl"
 
 uniform sampler2D t_landing;
 uniform sampler2D t_caster_position;
-uniform sampler2D t_receiver_normal;
 uniform float u_sigma;          // standard deviation of a splat in units of the distance to its neighbour
 uniform float u_max_radius;     // texels
 

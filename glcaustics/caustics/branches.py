@@ -1,0 +1,116 @@
+"""The branches into which one light splits at specular surfaces, and the statistics of their solves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from glcaustics.passes.frame import FrameSetup, LightSetup
+from glcaustics.passes.geometry import TRANSMISSIVE_KINDS
+from glcaustics.passes.runner import PlanRunner
+from glcaustics.scene.model import OpticalKind
+
+STATUS_WORDS = {  # negative values in landing.w; see solve.frag
+    -1: "total_internal_reflection",
+    -2: "missed_all_receivers",
+    -3: "unconverged",
+    -4: "no_exit_found",
+    -5: "absorbed",
+}
+CONVERGED, BRACKETED = 1, 2
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Refracted or reflected light of one light source, of all colour channels or of one.
+
+    `channels`: 1 for the colour channels carried; `channel`: the one whose index of refraction counts.
+    """
+
+    light_index: int
+    reflect: bool
+    channels: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    channel: int = 1
+    suffix: str = ""
+
+    @property
+    def kind(self) -> str:
+        return "reflect" if self.reflect else "refract"
+
+    @property
+    def words(self) -> str:
+        return "reflected" if self.reflect else f"refracted{self.suffix.replace('.', ' ')}"
+
+    def pass_name(self, stage: str) -> str:
+        return f"caustic_map.{stage}.{self.kind}{self.suffix}@{self.light_index}"
+
+    def _resource(self, name: str) -> str:
+        return f"caustic_map.{self.kind}{self.suffix}.{name}@{self.light_index}"
+
+    @property
+    def landing(self) -> str:
+        return self._resource("landing_ws")
+
+    @property
+    def flux(self) -> str:
+        return self._resource("flux")
+
+    @property
+    def splat(self) -> str:
+        return self._resource("splat")
+
+    @property
+    def conic(self) -> str:
+        return self._resource("conic")
+
+
+def branches_of(setup: FrameSetup, light: LightSetup) -> list[Branch]:
+    """What the scene's materials call for."""
+    kinds = setup.kinds()
+    transmissive = [i for i in setup.instances() if i.optical_kind in TRANSMISSIVE_KINDS]
+    branches = []
+    if transmissive:
+        if setup.options["dispersion"] and any(i.material.dispersion > 0.0 for i in transmissive):
+            for channel, name in enumerate(("red", "green", "blue")):
+                mask = tuple(1.0 if c == channel else 0.0 for c in range(3))
+                branches.append(Branch(light.index, False, (mask[0], mask[1], mask[2]), channel, f".{name}"))
+        else:
+            branches.append(Branch(light.index, False))
+    if OpticalKind.MIRROR in kinds or (transmissive and setup.options["reflect"]):
+        branches.append(Branch(light.index, True))
+    return branches
+
+
+def solve_statistics(branch: Branch, runner: PlanRunner) -> dict[str, Any]:
+    """Iterations, converged and failed rays, and the flux they carry or lose, of one solve. Reads two textures back."""
+    landing = read_rgba32f(runner, branch.landing)
+    flux = read_rgba32f(runner, branch.flux)
+    status = np.rint(landing[..., 3]).astype(int)
+    lumens = flux[..., :3].astype(np.float64).sum(axis=2) / max(sum(branch.channels), 1.0)
+    tried = status != 0
+    landed = status > 0
+    total = float(lumens[tried].sum())
+    lost = {word: float(lumens[status == code].sum()) for code, word in STATUS_WORDS.items() if (status == code).any()}
+    iterations = flux[..., 3][tried]
+    return {
+        "solve": branch.pass_name("solve"),
+        "rays": int(tried.sum()),
+        "converged": int((status == CONVERGED).sum()),
+        "bracketed": int((status == BRACKETED).sum()),
+        "failed": int((tried & ~landed).sum()),
+        "lookups_mean": float(iterations.mean()) if iterations.size else 0.0,
+        "lookups_max": int(iterations.max()) if iterations.size else 0,
+        "flux": total,
+        "flux_landed": float(lumens[landed].sum()),
+        "flux_lost": float(sum(lost.values())),
+        "flux_lost_by_cause": lost,
+        "flux_lost_share": float(sum(lost.values()) / total) if total > 0.0 else 0.0,
+    }
+
+
+def read_rgba32f(runner: PlanRunner, resource: str) -> np.ndarray:
+    """(H, W, 4) float32, row 0 lowest."""
+    texture = runner.texture(resource)
+    return np.frombuffer(texture.read(), np.float32).reshape(texture.height, texture.width, 4)

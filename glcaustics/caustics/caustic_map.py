@@ -1,0 +1,291 @@
+"""Caustics mapping (Shah, Konttinen, Pattanaik 2007): one sample a light-space texel, splatted where its light lands.
+
+Beyond the paper: exact flux of a texel, exact Fresnel, splats that follow the local stretch, views fitted to where the light lands, a
+bracketing fallback for what the fixed point misses, refraction and reflection of the same texel, and every loss counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from glcaustics.caustics.branches import Branch, branches_of, solve_statistics
+from glcaustics.caustics.landing import fit_receiver
+from glcaustics.caustics.method import IRRADIANCE, CausticsMethod
+from glcaustics.errors import UsageError
+from glcaustics.gpu import Device
+from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
+from glcaustics.passes import light_view
+from glcaustics.passes.frame import FrameSetup, FrameState, LightSetup, PassContext
+from glcaustics.passes.light_views import light_uniforms
+from glcaustics.passes.runner import PlanRunner
+from glcaustics.scene.model import OpticalKind
+
+SHADERS = "caustics/caustic_map"
+ESTIMATES = {"fixed_point": 0, "newton_fd": 1, "hybrid": 2}
+SPLAT_SIGMA = 0.62  # of the distance to the neighbour: least blur at which a regular grid of splats is flat to 0.2 %
+
+
+class CausticMap(CausticsMethod):
+    """See the module."""
+
+    name = "caustic_map"
+    summary = "light-space samples of water, glass and mirrors, splatted where their light lands"
+    paper = "Shah, Konttinen, Pattanaik 2007: Caustics Mapping: An Image-space Technique for Real-time Caustics"
+    ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "draft": {"caster_size": 96, "map_size": 192, "max_iterations": 6, "march_steps": 12},
+        "low": {"caster_size": 160, "map_size": 320, "max_iterations": 8, "march_steps": 16},
+        "medium": {"caster_size": 288, "map_size": 512, "max_iterations": 10, "march_steps": 24},
+        "high": {"caster_size": 768, "map_size": 1024, "max_iterations": 12, "march_steps": 48},
+        "reference": {"caster_size": 2048, "map_size": 2048, "max_iterations": 16, "march_steps": 96},
+    }
+    option_help: ClassVar[Mapping[str, str]] = {
+        "caster_size": "the casters' light view has about this^2 texels, one light sample each (8..8192)",
+        "map_size": "the caustic map has about this^2 texels (8..8192)",
+        "estimate": "where a ray lands: fixed_point, newton_fd or hybrid",
+        "max_iterations": "of that estimate (1..64)",
+        "march_steps": "of the bracketing fallback and of reflected rays (0..512; 0 = off)",
+        "reflect": "follow reflected light too (true, false)",
+        "dispersion": "refract red, green and blue apart where a material disperses (true, false)",
+        "naive_flux": "the paper's N.L / V flux instead of the exact one, as a baseline (true, false)",
+        "max_radius": "largest splat, texels of the map (2..64)",
+    }
+    defaults: ClassVar[Mapping[str, Any]] = {
+        "estimate": "hybrid",
+        "reflect": True,
+        "dispersion": True,
+        "naive_flux": False,
+        "max_radius": 48.0,
+    }
+
+    def __init__(self) -> None:
+        self._branches: dict[int, list[Branch]] = {}
+        self._left_out: list[tuple[str, str]] = []
+
+    @classmethod
+    def validate(cls, options: Mapping[str, Any]) -> None:
+        ranges = {"caster_size": (8, 8192), "map_size": (8, 8192), "max_iterations": (1, 64), "march_steps": (0, 512), "max_radius": (2, 64)}
+        for name, (low, high) in ranges.items():
+            value = options[name]
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+                raise UsageError(f"option {name} is {value!r}", where="caustic_map", remedy=f"give a number from {low} to {high}")
+        if options["estimate"] not in ESTIMATES:
+            raise UsageError(
+                f"option estimate is {options['estimate']!r}", where="caustic_map", remedy=f"use one of {', '.join(ESTIMATES)}"
+            )
+        for name in ("reflect", "dispersion", "naive_flux"):
+            if not isinstance(options[name], bool):
+                raise UsageError(f"option {name} is {options[name]!r}", where="caustic_map", remedy="use true or false")
+
+    # -- declaration --------------------------------------------------------------------------------------------------
+
+    def prepare(self, device: Device, setup: FrameSetup, frame: FrameState) -> None:
+        """Send a coarse light through the scene once, and fit each light's receiver view to where it lands."""
+        for light in setup.lights:
+            if light.caster is not None:
+                landed = fit_receiver(self, device, setup, light, frame)
+                self._keep_branches(setup, light, landed)
+
+    def _keep_branches(self, setup: FrameSetup, light: LightSetup, landed: Mapping[str, float]) -> None:
+        """Leave out the branches none of whose light lands."""
+        kept = []
+        for branch in branches_of(setup, light):
+            if landed.get(branch.kind, 1.0) > 1e-5:
+                kept.append(branch)
+            else:
+                self._left_out.append((branch.pass_name("solve"), f"no {branch.words} light lands on a receiver"))
+        self._branches[light.index] = kept
+
+    def branches(self, setup: FrameSetup, light: LightSetup) -> list[Branch]:
+        """The branches that this light needs."""
+        return self._branches.get(light.index, branches_of(setup, light))
+
+    def leave_out(self, graph: FrameGraph, setup: FrameSetup, because: str) -> None:
+        for light in setup.lights:
+            for name in ("caster_view", "receiver_view", "caustic_map.solve", "caustic_map.splat"):
+                graph.leave_out(f"{name}{light.resource('')}", because)
+        graph.leave_out("caustic_map.gather", because)
+
+    def declare(self, graph: FrameGraph, setup: FrameSetup) -> None:
+        maps = []
+        for light in setup.lights:
+            if light.caster is None or light.receiver is None or not self.branches(setup, light):
+                graph.leave_out(f"caustic_map{light.resource('')}", "its light reaches no specular surface, or none of it lands")
+                continue
+            self.declare_solves(graph, setup, light)
+            maps.append(self._declare_splat(graph, setup, light))
+        for name, because in self._left_out:
+            graph.leave_out(name, because)
+        lit = [light for light in setup.lights if light.resource("caustic_map.flux") in maps]
+        graph.add(
+            PassDecl(
+                "caustic_map.gather",
+                {IRRADIANCE: self.irradiance_desc(setup)},
+                lambda ctx: self._gather(ctx, lit),
+                reads=("gbuffer.depth_m", "gbuffer.normal_ws", *maps, *(light.resource("receiver.position_ws") for light in lit)),
+                note="look-up in the caustic maps at the camera's pixels",
+            )
+        )
+
+    def declare_solves(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup) -> None:
+        """Light views and landing points of one light; also what the coarse fit runs."""
+        light_view.declare_caster(graph, setup, light)
+        light_view.declare_receiver(graph, setup, light)
+        if OpticalKind.SOLID in setup.kinds():
+            light_view.declare_caster_back(graph, setup, light)
+        else:
+            graph.leave_out(f"caster_back{light.resource('')}", "nothing in the scene is a solid with two interfaces")
+        for branch in self.branches(setup, light):
+            self._declare_solve(graph, setup, light, branch)
+
+    def _declare_solve(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, branch: Branch) -> None:
+        assert light.caster is not None
+        size = light.caster.size
+        back = (light.resource("caster.back_position_ws"), light.resource("caster.back_normal_ws"))
+        graph.add(
+            PassDecl(
+                branch.pass_name("solve"),
+                {branch.landing: TextureDesc("rgba32f", size, "m"), branch.flux: TextureDesc("rgba32f", size, "lm")},
+                lambda ctx: self._solve(ctx, light, branch),
+                reads=tuple(
+                    light.resource(n)
+                    for n in ("caster.position_ws", "caster.normal_ws", "receiver.position_ws", "receiver.normal_ws")
+                ),
+                optional=back if not branch.reflect else (),
+                note=f"where {branch.words} light lands",
+            )
+        )
+        graph.add(
+            PassDecl(
+                branch.pass_name("footprint"),
+                {branch.splat: TextureDesc("rgba32f", size, "texel"), branch.conic: TextureDesc("rgba32f", size)},
+                lambda ctx: self._footprint(ctx, light, branch),
+                reads=(branch.landing, light.resource("caster.position_ws")),
+                note="how far it is spread there",
+            )
+        )
+
+    def _declare_splat(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup) -> str:
+        assert light.receiver is not None
+        branches = self.branches(setup, light)
+        resource = light.resource("caustic_map.flux")
+        graph.add(
+            PassDecl(
+                f"caustic_map.splat{light.resource('')}",
+                {resource: TextureDesc("rgba32f", light.receiver.size, "lm")},
+                lambda ctx: self._splat(ctx, light, branches, resource),
+                reads=tuple(r for b in branches for r in (b.splat, b.conic, b.flux)),
+                note="the light added up in the caustic map",
+            )
+        )
+        return resource
+
+    # -- execution ----------------------------------------------------------------------------------------------------
+
+    def _solve(self, ctx: PassContext, light: LightSetup, branch: Branch) -> None:
+        assert light.caster is not None and light.receiver is not None
+        options = ctx.setup.options
+        back = ctx.has(light.resource("caster.back_position_ws"))
+        program = ctx.device.program(
+            f"{SHADERS}/solve",
+            {
+                "CASTER_FACES": light.caster.faces,
+                "RECEIVER_FACES": light.receiver.faces,
+                "REFLECT": int(branch.reflect),
+                "HAS_BACK": int(back),
+                "NAIVE_FLUX": int(options["naive_flux"]),
+                "ESTIMATE": ESTIMATES[options["estimate"]],
+            },
+        )
+        textures = {
+            "t_caster_position": "caster.position_ws",
+            "t_caster_normal": "caster.normal_ws",
+            "t_receiver_position": "receiver.position_ws",
+            "t_receiver_normal": "receiver.normal_ws",
+        }
+        if back:
+            textures |= {"t_back_position": "caster.back_position_ws", "t_back_normal": "caster.back_normal_ws"}
+        low, high = ctx.setup.scene_bounds_ws
+        program.set_all(
+            {
+                **{name: ctx.texture(light.resource(r)) for name, r in textures.items()},
+                **light.caster.uniforms("caster"),
+                **light.receiver.uniforms("receiver"),
+                **light_uniforms(light.light),
+                "t_objects": ctx.frame.gpu.objects,
+                "u_bounds_min_ws": tuple(low),
+                "u_bounds_max_ws": tuple(high),
+                "u_channels": branch.channels,
+                "u_channel": branch.channel,
+                "u_max_iterations": int(options["max_iterations"]),
+                "u_march_steps": int(options["march_steps"]),
+            }
+        )
+        if options["naive_flux"]:
+            self._set_naive(program, ctx, light)
+        ctx.device.draw_fullscreen(program, ctx.target(branch.landing, branch.flux))
+
+    @staticmethod
+    def _set_naive(program: Any, ctx: PassContext, light: LightSetup) -> None:
+        """Their eq. 6 divides by V, the covered texels, from an occlusion query; here the whole view stands for it."""
+        assert light.caster is not None
+        texels = light.caster.size[0] * light.caster.size[1]
+        program.set_all({"u_inverse_texels": 1.0 / texels, "u_caster_area_m2": light.caster.texel_measure * texels})
+
+    def _footprint(self, ctx: PassContext, light: LightSetup, branch: Branch) -> None:
+        assert light.caster is not None and light.receiver is not None
+        program = ctx.device.program(f"{SHADERS}/footprint", {"RECEIVER_FACES": light.receiver.faces})
+        program.set_all(
+            {
+                "t_landing": ctx.texture(branch.landing),
+                "t_caster_position": ctx.texture(light.resource("caster.position_ws")),
+                **light.receiver.uniforms("receiver"),
+                "u_sigma": SPLAT_SIGMA,
+                "u_max_radius": float(ctx.setup.options["max_radius"]),
+            }
+        )
+        ctx.device.draw_fullscreen(program, ctx.target(branch.splat, branch.conic))
+
+    def _splat(self, ctx: PassContext, light: LightSetup, branches: list[Branch], resource: str) -> None:
+        assert light.caster is not None and light.receiver is not None
+        target = ctx.target(resource)
+        target.clear(0.0, 0.0, 0.0, 0.0)
+        width, height = light.caster.size
+        for branch in branches:
+            program = ctx.device.program(f"{SHADERS}/splat", {"RECEIVER_FACES": light.receiver.faces})
+            program.set_all(
+                {
+                    "t_splat": ctx.texture(branch.splat),
+                    "t_conic": ctx.texture(branch.conic),
+                    "t_flux": ctx.texture(branch.flux),
+                    "u_width": width,
+                    "u_map_size": (float(light.receiver.size[0]), float(light.receiver.size[1])),
+                }
+            )
+            ctx.device.draw_points(program, target, width * height, blend="add")
+
+    def _gather(self, ctx: PassContext, lit: list[LightSetup]) -> None:
+        target = ctx.target(IRRADIANCE)
+        target.clear(0.0, 0.0, 0.0, 0.0)
+        for light in lit:
+            assert light.receiver is not None
+            program = ctx.device.program(f"{SHADERS}/gather", {"RECEIVER_FACES": light.receiver.faces})
+            program.set_all(
+                {
+                    **ctx.frame.uniforms(),
+                    **light.receiver.uniforms("receiver"),
+                    "t_depth_m": ctx.texture("gbuffer.depth_m"),
+                    "t_normal_ws": ctx.texture("gbuffer.normal_ws"),
+                    "t_receiver_position": ctx.texture(light.resource("receiver.position_ws")),
+                    "t_flux": ctx.texture(light.resource("caustic_map.flux")),
+                }
+            )
+            ctx.device.draw_fullscreen(program, target, blend="add")
+
+    # -- statistics ---------------------------------------------------------------------------------------------------
+
+    def stats_resources(self) -> tuple[str, ...]:
+        return tuple(r for branches in self._branches.values() for b in branches for r in (b.landing, b.flux))
+
+    def solve_stats(self, runner: PlanRunner) -> list[dict[str, Any]]:
+        return [solve_statistics(b, runner) for branches in self._branches.values() for b in branches]

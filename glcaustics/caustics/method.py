@@ -1,0 +1,75 @@
+"""What a caustics method is: it declares its passes, the frame graph decides."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from glcaustics.gpu import Device
+from glcaustics.graph import FrameGraph, TextureDesc
+from glcaustics.passes.frame import FrameSetup, FrameState
+from glcaustics.passes.runner import PlanRunner
+
+QUALITIES = ("draft", "low", "medium", "high", "reference")
+
+IRRADIANCE = "caustics.irradiance"  # what every method writes: E_c at the camera's opaque pixels, W/m^2 or lux
+
+
+class CausticsMethod(ABC):
+    """A way to compute the caustic irradiance E_c (methods.md 1) at the camera's opaque pixels.
+
+    A method adds its passes to the graph in `declare`; the last of them writes `caustics.irradiance`. One instance serves one
+    renderer, so it may keep what it measured in `prepare`.
+
+    Attributes:
+        name: as in `--method`. summary: one line. paper: author, year, title.
+        ladder: quality -> options; more cost and less error from step to step.
+        option_help: option -> one line with its unit and range.
+    """
+
+    name: ClassVar[str]
+    summary: ClassVar[str]
+    paper: ClassVar[str]
+    ladder: ClassVar[Mapping[str, Mapping[str, Any]]]
+    option_help: ClassVar[Mapping[str, str]] = {}
+
+    @classmethod
+    def why_not(cls, setup: FrameSetup) -> str | None:
+        """Why this scene does not need the method; None when it does."""
+        if not setup.has_specular:
+            return "nothing in the scene refracts or reflects"
+        if not setup.has_receivers:
+            return "nothing in the scene receives caustics"
+        if all(light.caster is None for light in setup.lights):
+            return "no light reaches a specular surface"
+        return None
+
+    @classmethod
+    @abstractmethod
+    def validate(cls, options: Mapping[str, Any]) -> None:
+        """Raise UsageError for an option out of its range."""
+
+    def prepare(self, device: Device, setup: FrameSetup, frame: FrameState) -> None:
+        """Once, before the first frame: measure what the light views have to hold."""
+
+    @abstractmethod
+    def declare(self, graph: FrameGraph, setup: FrameSetup) -> None:
+        """Add the passes; the last one writes `caustics.irradiance`."""
+
+    @abstractmethod
+    def leave_out(self, graph: FrameGraph, setup: FrameSetup, because: str) -> None:
+        """Record the passes that this scene does not need."""
+
+    def stats_resources(self) -> tuple[str, ...]:
+        """Resources that `solve_stats` reads; kept to the end of the frame when statistics are collected."""
+        return ()
+
+    def solve_stats(self, runner: PlanRunner) -> list[dict[str, Any]]:
+        """One dictionary a solve: iterations, converged, failed, flux and lost flux by cause."""
+        return []
+
+    @staticmethod
+    def irradiance_desc(setup: FrameSetup) -> TextureDesc:
+        """The texture of `caustics.irradiance`."""
+        return TextureDesc("rgba32f", setup.size, "lux", filter="linear")

@@ -1,0 +1,269 @@
+"""What every pass and method knows of the frame: the scene's analysis, the light views, and the state of one frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from glcaustics.errors import GraphError
+from glcaustics.gpu import Device
+from glcaustics.graph import Step, check_read, check_write
+from glcaustics.passes.geometry import SPECULAR_KINDS, GpuScene, points_of
+from glcaustics.passes.light_views import LightView, fit_view, orthographic, perspective, unit
+from glcaustics.scene.model import Camera, FloatArray, Instance, Light, LightKind, OpticalKind, Scene
+
+SAMPLE_TIMES_S = (0.0, 1.3, 2.9, 5.3)  # where an animated water is looked at to bound its motion
+
+
+@dataclass(eq=False)
+class LightSetup:
+    """One light and its views; a view is None where the scene does not need it."""
+
+    index: int
+    light: Light
+    shadow: LightView | None = None
+    caster: LightView | None = None
+    receiver: LightView | None = None
+
+    def resource(self, name: str) -> str:
+        """A resource of this light: "caster.normal_ws@0"."""
+        return f"{name}@{self.index}"
+
+
+@dataclass(eq=False)
+class FrameSetup:
+    """What stays the same from frame to frame: the scene, the size, the options, the light views.
+
+    `shadow_size`: the shadow maps have about that^2 texels. `transmissive_shadows`: water and glass cut direct light, since a caustics
+    method brings what arrives. `bounds_ws`: (2, 3), the receivers' box.
+    """
+
+    scene: Scene
+    size: tuple[int, int]
+    options: Mapping[str, Any]
+    transmissive_shadows: bool
+    seed: int = 0
+    collect_stats: bool = True
+    lights: list[LightSetup] = field(default_factory=list)
+    static_instances: tuple[Instance, ...] = ()
+    sampled_instances: tuple[Instance, ...] = ()
+    bounds_ws: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
+    scene_bounds_ws: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
+
+    @staticmethod
+    def analyse(
+        scene: Scene, size: tuple[int, int], options: Mapping[str, Any], *, transmissive_shadows: bool, seed: int = 0
+    ) -> FrameSetup:
+        """Classify the scene and fit the views of its lights (NumPy only)."""
+        setup = FrameSetup(scene, size, options, transmissive_shadows, seed)
+        times = SAMPLE_TIMES_S if any(w.animated for w in scene.waters) else SAMPLE_TIMES_S[:1]
+        setup.sampled_instances = tuple(
+            Instance(w.name, w.mesh_at(t), w.material, w.world_from_object) for w in scene.waters for t in times
+        )
+        setup.static_instances = scene.instances
+        everything = setup.instances()
+        receivers = [i for i in everything if i.optical_kind is OpticalKind.DIFFUSE]
+        setup.scene_bounds_ws = _box(points_of(everything))
+        setup.bounds_ws = _box(points_of(receivers)) if receivers else setup.scene_bounds_ws
+        setup.lights = [setup._light(i, light, everything) for i, light in enumerate(scene.lights)]
+        return setup
+
+    def instances(self) -> tuple[Instance, ...]:
+        """All instances, animated waters at several times: what views must hold."""
+        return self.static_instances + self.sampled_instances
+
+    def kinds(self) -> set[OpticalKind]:
+        """The optical kinds that occur."""
+        return {instance.optical_kind for instance in self.instances()}
+
+    @property
+    def has_specular(self) -> bool:
+        return any(kind in SPECULAR_KINDS for kind in self.kinds())
+
+    @property
+    def has_receivers(self) -> bool:
+        return OpticalKind.DIFFUSE in self.kinds()
+
+    @property
+    def is_animated(self) -> bool:
+        return any(w.animated for w in self.scene.waters)
+
+    def _light(self, index: int, light: Light, everything: tuple[Instance, ...]) -> LightSetup:
+        setup = LightSetup(index, light)
+        if light.intensity <= 0.0 or not any(c > 0.0 for c in light.color):
+            return setup
+        points = points_of(everything)
+        blockers = self.shadow_casters(everything, light)
+        if blockers:
+            setup.shadow = fit_view(light, points_of(blockers), int(self.options["shadow_size"]))
+        casters = [i for i in everything if i.optical_kind in SPECULAR_KINDS]
+        if casters and self.has_receivers:
+            setup.caster = fit_view(light, points_of(casters), int(self.options["caster_size"]), depth_points_ws=points)
+            receivers = points_of([i for i in everything if i.optical_kind is OpticalKind.DIFFUSE])
+            setup.receiver = fit_view(light, receivers, int(self.options["map_size"]))
+        return setup
+
+    def blocks_light(self, instance: Instance) -> bool:
+        """Whether direct light ends at this instance."""
+        return self.transmissive_shadows or instance.optical_kind in (OpticalKind.DIFFUSE, OpticalKind.MIRROR)
+
+    def shadow_casters(self, everything: tuple[Instance, ...], light: Light) -> list[Instance]:
+        """Instances that can throw a shadow on something: a flat ground with everything on the light's side cannot."""
+        blockers = [i for i in everything if self.blocks_light(i)]
+        return [i for i in blockers if not _is_ground(i, everything, light)]
+
+
+def _is_ground(instance: Instance, everything: tuple[Instance, ...], light: Light) -> bool:
+    """A plane with nothing behind it, seen from the light."""
+    points = instance.positions_ws()
+    if len(points) > 4096:
+        return False
+    low, high = points.min(axis=0), points.max(axis=0)
+    extent = float(np.linalg.norm(high - low))
+    _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    normal, origin = axes[2], points.mean(axis=0)
+    if float(np.abs((points - origin) @ normal).max()) > 1e-5 * extent:
+        return False
+    if light.kind is LightKind.DIRECTIONAL:
+        side = -float(np.asarray(light.direction_ws) @ normal)
+    else:
+        side = float((np.asarray(light.position_ws) - origin) @ normal)
+    normal = normal if side >= 0.0 else -normal
+    others = points_of([i for i in everything if i is not instance])
+    return len(others) == 0 or bool(((others - origin) @ normal).min() > -1e-4 * extent)
+
+
+def _box(points: FloatArray) -> FloatArray:
+    """(2, 3) bounding box, with a little air so that flat boxes have an inside."""
+    if len(points) == 0:
+        return np.array([[-1.0] * 3, [1.0] * 3])
+    low, high = points.min(axis=0), points.max(axis=0)
+    air = 1e-3 * float(np.linalg.norm(high - low))
+    return np.stack([low - air, high + air])
+
+
+@dataclass(eq=False)
+class CameraState:
+    """Matrices of one camera at one time, column-vector form; uniforms of `interface/camera.glsl`."""
+
+    world_from_camera: FloatArray
+    camera_from_world: FloatArray
+    clip_from_world: FloatArray
+    lens: tuple[float, float, float, float]
+    orthographic: bool
+
+    @staticmethod
+    def make(camera: Camera, size: tuple[int, int], bounds_ws: FloatArray) -> CameraState:
+        """Clip planes fitted to the scene's box, so that depth is well conditioned at any scale."""
+        world_from_camera = np.asarray(camera.world_from_camera, np.float64)
+        camera_from_world = np.linalg.inv(world_from_camera)
+        corners = np.array([[bounds_ws[i, 0], bounds_ws[j, 1], bounds_ws[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+        depth = -(corners @ camera_from_world[2, :3] + camera_from_world[2, 3])
+        extent = float(np.linalg.norm(bounds_ws[1] - bounds_ws[0]))
+        far = max(float(depth.max()), 1e-3 * extent) * 1.001 + 1e-3 * extent
+        aspect = size[0] / size[1]
+        if camera.orthographic:
+            near = float(depth.min()) - 1e-3 * extent
+            lens = (camera.ymag_m * aspect, camera.ymag_m)
+            projection = orthographic(-lens[0], lens[0], -lens[1], lens[1], near, far)
+        else:
+            near = max(float(depth.min()) * 0.999, 5e-4 * far)
+            tangent = float(np.tan(0.5 * camera.yfov_rad))
+            lens = (tangent * aspect, tangent)
+            projection = perspective(-lens[0], lens[0], -lens[1], lens[1], near, far)
+        return CameraState(
+            world_from_camera,
+            camera_from_world,
+            projection @ camera_from_world,
+            (*lens, 1.0 if camera.orthographic else 0.0, 0.0),
+            camera.orthographic,
+        )
+
+    def uniforms(self) -> dict[str, Any]:
+        forward = -unit(self.world_from_camera[:3, 2])
+        return {
+            "u_world_from_camera": self.world_from_camera,
+            "u_camera_lens": self.lens,
+            "u_camera_clip_from_world": self.clip_from_world,
+            "u_camera_from_world": self.camera_from_world,
+            "u_eye_ws": tuple(self.world_from_camera[:3, 3]),
+            "u_eye_direction": (*forward, 1.0 if self.orthographic else 0.0),
+        }
+
+
+@dataclass(eq=False)
+class FrameState:
+    """One frame: its time, its camera, the geometry on the GPU, the exposure, and the solves' statistics."""
+
+    time_s: float
+    camera: CameraState
+    previous_camera: CameraState
+    gpu: GpuScene
+    exposure: float
+    previous_transforms: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    def uniforms(self) -> dict[str, Any]:
+        return self.camera.uniforms()
+
+
+class PassContext:
+    """What a pass gets to execute with: its textures and targets, and nothing that it did not declare."""
+
+    def __init__(
+        self,
+        step: Step,
+        device: Device,
+        setup: FrameSetup,
+        frame: FrameState,
+        textures: Mapping[str, moderngl.Texture],
+        framebuffers: dict[tuple[int, ...], moderngl.Framebuffer],
+    ) -> None:
+        self.step = step
+        self.device = device
+        self.setup = setup
+        self.frame = frame
+        self._textures = textures
+        self._framebuffers = framebuffers
+
+    def texture(self, resource: str) -> moderngl.Texture:
+        """A declared read. Raises GraphError otherwise."""
+        check_read(self.step, resource)
+        return self._textures[resource]
+
+    def has(self, resource: str) -> bool:
+        """Whether a declared optional read is there."""
+        return resource in self.step.readable
+
+    def live(self, resource: str) -> bool:
+        """Whether somebody reads this attachment."""
+        if resource not in self.step.decl.writes:
+            raise GraphError(f"pass '{self.step.name}' asks for '{resource}', which it does not write")
+        return resource in self.step.live_writes
+
+    def target(self, *resources: str, depth: str | None = None) -> moderngl.Framebuffer:
+        """A framebuffer of the live ones among the attachments, in order. Kept from frame to frame."""
+        for resource in (*resources, *([depth] if depth else [])):
+            if resource not in self.step.decl.writes:
+                check_write(self.step, resource)
+        colors = [self._textures[r] for r in resources if r in self.step.live_writes]
+        depth_texture = self._textures[depth] if depth is not None else None
+        key = tuple(t.glo for t in (*colors, *([depth_texture] if depth_texture else [])))
+        found = self._framebuffers.get(key)
+        if found is None:
+            found = self._framebuffers[key] = self.device.framebuffer(colors, depth_texture, self.step.name)
+        return found
+
+    def locations(self, **outputs: str) -> dict[str, int]:
+        """Defines HAS_X and LOCATION_X for each live attachment, HAS_X 0 for the others; outputs: X -> resource."""
+        defines: dict[str, int] = {}
+        location = 0
+        for name, resource in outputs.items():
+            defines[f"HAS_{name}"] = int(self.live(resource))
+            if self.live(resource):
+                defines[f"LOCATION_{name}"] = location
+                location += 1
+        return defines

@@ -1,0 +1,112 @@
+"""What a light sees: the casters (specular surfaces), their back faces, and the receivers (Shah et al. 2007, passes 1 and 2)."""
+
+from __future__ import annotations
+
+from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
+from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext
+from glcaustics.passes.geometry import DrawItem
+from glcaustics.passes.light_views import LightView
+from glcaustics.scene.model import OpticalKind
+
+SHADER = "passes/light_view/light_view"
+
+
+def declare_caster(graph: FrameGraph, setup: FrameSetup, light: LightSetup) -> None:
+    """Position and normal of the first specular surface; opaque geometry in front of it hides it."""
+    assert light.caster is not None
+    size = light.caster.size
+    position, normal, depth = (light.resource(f"caster.{n}") for n in ("position_ws", "normal_ws", "depth"))
+    graph.add(
+        PassDecl(
+            f"caster_view{light.resource('')}",
+            {
+                position: TextureDesc("rgba32f", size, "m"),
+                normal: TextureDesc("rgba32f", size),
+                depth: TextureDesc("depth24", size),
+            },
+            lambda ctx: _draw_caster(ctx, light, position, normal, depth),
+            always_writes=(depth,),
+            note="specular surfaces seen from the light",
+        )
+    )
+
+
+def _draw_caster(ctx: PassContext, light: LightSetup, position: str, normal: str, depth: str) -> None:
+    assert light.caster is not None
+    target = ctx.target(position, normal, depth=depth)
+    target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+    outputs = {**ctx.locations(POSITION=position, NORMAL=normal), "BACK": 0}
+    occluder = ctx.device.program(SHADER, {**outputs, "OCCLUDER": 1})
+    shown = ctx.device.program(SHADER, {**outputs, "OCCLUDER": 0})
+    gpu = ctx.frame.gpu
+    for matrix, viewport in zip(light.caster.matrices, light.caster.viewports(), strict=True):
+        occluder.set(u_clip_from_world=matrix)
+        gpu.draw(occluder, target, gpu.select(OpticalKind.DIFFUSE), viewport=viewport)
+        shown.set(u_clip_from_world=matrix)
+        gpu.draw(shown, target, gpu.select(OpticalKind.MIRROR, OpticalKind.INTERFACE), viewport=viewport)
+        gpu.draw(shown, target, gpu.select(OpticalKind.SOLID), viewport=viewport, cull="back")
+
+
+def declare_caster_back(graph: FrameGraph, setup: FrameSetup, light: LightSetup) -> None:
+    """The first back face behind each solid's front (Wyman 2005), for its second interface."""
+    assert light.caster is not None
+    size = light.caster.size
+    front = light.resource("caster.position_ws")
+    position, normal, depth = (light.resource(f"caster.{n}") for n in ("back_position_ws", "back_normal_ws", "back_depth"))
+    graph.add(
+        PassDecl(
+            f"caster_back{light.resource('')}",
+            {
+                position: TextureDesc("rgba32f", size, "m"),
+                normal: TextureDesc("rgba32f", size, filter="linear"),
+                depth: TextureDesc("depth24", size),
+            },
+            lambda ctx: _draw_back(ctx, light, front, position, normal, depth),
+            reads=(front,),
+            always_writes=(depth,),
+            note="back faces of solids seen from the light",
+        )
+    )
+
+
+def _draw_back(ctx: PassContext, light: LightSetup, front: str, position: str, normal: str, depth: str) -> None:
+    assert light.caster is not None
+    target = ctx.target(position, normal, depth=depth)
+    target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+    program = ctx.device.program(SHADER, {**ctx.locations(POSITION=position, NORMAL=normal), "BACK": 1, "OCCLUDER": 0})
+    program.set(t_front_position=ctx.texture(front), u_light=light.caster.light_vec4)
+    _draw_kind(ctx, light.caster, program, target, ctx.frame.gpu.select(OpticalKind.SOLID), cull="front")
+
+
+def declare_receiver(graph: FrameGraph, setup: FrameSetup, light: LightSetup) -> None:
+    """Position and normal of the first opaque surface, as if there were no specular ones."""
+    assert light.receiver is not None
+    size = light.receiver.size
+    position, normal, depth = (light.resource(f"receiver.{n}") for n in ("position_ws", "normal_ws", "depth"))
+    graph.add(
+        PassDecl(
+            f"receiver_view{light.resource('')}",
+            {
+                position: TextureDesc("rgba32f", size, "m"),
+                normal: TextureDesc("rgba32f", size),
+                depth: TextureDesc("depth24", size),
+            },
+            lambda ctx: _draw_receiver(ctx, light, position, normal, depth),
+            always_writes=(depth,),
+            note="opaque surfaces seen from the light, where caustics can land",
+        )
+    )
+
+
+def _draw_receiver(ctx: PassContext, light: LightSetup, position: str, normal: str, depth: str) -> None:
+    assert light.receiver is not None
+    target = ctx.target(position, normal, depth=depth)
+    target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+    program = ctx.device.program(SHADER, {**ctx.locations(POSITION=position, NORMAL=normal), "BACK": 0, "OCCLUDER": 0})
+    _draw_kind(ctx, light.receiver, program, target, ctx.frame.gpu.select(OpticalKind.DIFFUSE))
+
+
+def _draw_kind(ctx, view: LightView, program, target, items: list[DrawItem], cull: str | None = None) -> None:  # type: ignore[no-untyped-def]
+    for matrix, viewport in zip(view.matrices, view.viewports(), strict=True):
+        program.set(u_clip_from_world=matrix)
+        ctx.frame.gpu.draw(program, target, items, viewport=viewport, cull=cull)

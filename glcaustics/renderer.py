@@ -1,0 +1,430 @@
+"""From a scene to a frame: analyse, declare, compile the graph, run it, read the result back."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from glcaustics.caustics.method import IRRADIANCE, QUALITIES, CausticsMethod
+from glcaustics.caustics.registry import AUTO, NONE, pick
+from glcaustics.errors import UsageError
+from glcaustics.gpu import Device, create_device
+from glcaustics.graph import FrameGraph, Plan
+from glcaustics.passes import gbuffer, lighting, refraction, rsm, shadow_map, tonemap
+from glcaustics.passes.frame import CameraState, FrameSetup, FrameState
+from glcaustics.passes.geometry import GpuScene
+from glcaustics.passes.runner import PlanRunner
+from glcaustics.scene.model import LightKind, OpticalKind, Scene
+
+AOVS: dict[str, str] = {
+    "image": "linear radiance of the picture, cd/m^2 or W/(m^2 sr)",
+    "caustic_irradiance": "E_c at the first non-specular surface on the eye's path, lux or W/m^2",
+    "direct_irradiance": "irradiance by direct light at the opaque layer, lux or W/m^2",
+    "depth_m": "distance along the view axis of the first surface, metres; 0 where there is none",
+    "normal_ws": "normal of the first surface, towards the eye, world space",
+    "position_ws": "position of the first surface, metres, world space",
+    "albedo": "base colour of the opaque layer, linear",
+    "solve_status": "eye ray: 0 opaque, 1 solved, 2 sky, 3 fallback to the straight pixel, 4 total internal reflection",
+}
+
+BASE_LADDER: dict[str, dict[str, Any]] = {
+    "draft": {"shadow_size": 512, "rsm_size": 256, "refraction_iterations": 2, "reflection_steps": 8},
+    "low": {"shadow_size": 1024, "rsm_size": 512, "refraction_iterations": 3, "reflection_steps": 12},
+    "medium": {"shadow_size": 1536, "rsm_size": 1024, "refraction_iterations": 4, "reflection_steps": 20},
+    "high": {"shadow_size": 2048, "rsm_size": 2048, "refraction_iterations": 6, "reflection_steps": 32},
+    "reference": {"shadow_size": 4096, "rsm_size": 2048, "refraction_iterations": 8, "reflection_steps": 64},
+}
+
+
+@dataclass(eq=False)
+class Frame:
+    """One rendered frame; arrays with row 0 on top.
+
+    `image`: (H, W, 3) float32 linear radiance. `ldr`: (H, W, 3) uint8 sRGB. `aov`: name -> (H, W) or (H, W, 3) float32.
+    `stats`: numbers for machines: per pass milliseconds and bytes, per solve iterations, converged, failed, lost flux.
+    """
+
+    image: npt.NDArray[np.float32]
+    ldr: npt.NDArray[np.uint8]
+    aov: dict[str, npt.NDArray[np.float32]]
+    stats: dict[str, Any]
+
+    def save(self, path: str | Path) -> None:
+        """Write .png, .npz or .exr; see `glcaustics.output`."""
+        from glcaustics.output import save_frame
+
+        save_frame(path, image=self.image, ldr=self.ldr, aov=self.aov)
+
+
+def resolve_options(method: type[CausticsMethod] | None, quality: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """The ladder's options with the user's on top.
+
+    Raises:
+        UsageError: unknown quality or option, or a value out of range.
+    """
+    if quality not in QUALITIES:
+        raise UsageError(f"quality '{quality}' is unknown", where="--quality", remedy=f"use one of {', '.join(QUALITIES)}")
+    resolved: dict[str, Any] = dict(BASE_LADDER[quality])
+    if method is not None:
+        resolved |= {**getattr(method, "defaults", {}), **method.ladder[quality]}
+    for name, value in options.items():
+        if name not in resolved:
+            raise UsageError(f"option '{name}' is unknown", where="--set", remedy=f"there are: {', '.join(sorted(resolved))}")
+        resolved[name] = {"true": True, "false": False}.get(value, value) if isinstance(value, str) else value
+    for name, base in BASE_LADDER[quality].items():
+        value = resolved[name]
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 16384:
+            raise UsageError(f"option {name} is {value!r}", where="--set", remedy=f"give a whole number from 1, such as {base}")
+    if method is not None:
+        method.validate(resolved)
+    return resolved
+
+
+def _aov_resources(setup: FrameSetup, aovs: tuple[str, ...], specular: bool, caustics: bool) -> list[str]:
+    """Graph resources that an AOV is read from."""
+    resources = {
+        "image": [],
+        "caustic_irradiance": ([("view.caustic_irradiance" if specular else IRRADIANCE)] if caustics else []),
+        "direct_irradiance": ["lighting.irradiance"],
+        "depth_m": ["gbuffer.depth_m", *(["specular.depth_m"] if specular else [])],
+        "normal_ws": ["gbuffer.normal_ws", *(["specular.depth_m", "specular.normal_ws"] if specular else [])],
+        "position_ws": ["gbuffer.depth_m", *(["specular.depth_m"] if specular else [])],
+        "albedo": ["gbuffer.albedo"],
+        "solve_status": (["view.solve_status"] if specular else []),
+    }
+    for name in aovs:
+        if name not in resources:
+            raise UsageError(f"AOV '{name}' is unknown", where="--aov", remedy=f"there are: {', '.join(AOVS)}")
+    return [r for name in aovs for r in resources[name]]
+
+
+@dataclass(eq=False)
+class _Declared:
+    graph: FrameGraph
+    outputs: tuple[str, ...]
+    radiance: str
+    specular: bool
+
+
+def _declare(
+    setup: FrameSetup, method: CausticsMethod | None, aovs: tuple[str, ...], specular_view: bool, method_name: str
+) -> _Declared:
+    """The whole frame, before anything is culled."""
+    graph = FrameGraph()
+    specular = setup.has_specular and specular_view
+    for light in setup.lights:
+        shadow_map.declare(graph, setup, light)
+        for with_specular in (False, True):
+            rsm.declare(graph, setup, light, with_specular=with_specular)
+    gbuffer.declare_opaque(graph, setup)
+    lighting.declare_lighting(graph, setup)
+    caustics = _declare_caustics(graph, setup, method, method_name)
+    lighting.declare_shade(graph, setup)
+    why = "nothing in the scene is specular" if specular_view else "the eye is asked to look past specular surfaces"
+    if specular:
+        gbuffer.declare_specular(graph, setup)
+        if OpticalKind.SOLID in setup.kinds():
+            gbuffer.declare_back(graph, setup)
+        else:
+            graph.leave_out("gbuffer.specular_back", "nothing in the scene is a solid with two interfaces")
+        refraction.declare(graph, setup)
+    else:
+        for name in ("gbuffer.specular", "gbuffer.specular_back", "refraction"):
+            graph.leave_out(name, why)
+    radiance = "view.radiance" if specular else "shade.radiance"
+    tonemap.declare(graph, setup, radiance)
+    outputs = ("present.ldr", radiance, *_aov_resources(setup, aovs, specular, caustics))
+    return _Declared(graph, tuple(dict.fromkeys(outputs)), radiance, specular)
+
+
+def _declare_caustics(graph: FrameGraph, setup: FrameSetup, method: CausticsMethod | None, method_name: str) -> bool:
+    if method is None:
+        graph.leave_out("caustics", f"method {method_name}: light passes straight through water and glass")
+        return False
+    because = method.why_not(setup)
+    if because is None:
+        method.declare(graph, setup)
+        return True
+    method.leave_out(graph, setup, because)
+    return False
+
+
+def plan_frame(
+    scene: Scene,
+    size: tuple[int, int] = (1280, 720),
+    method: str = AUTO,
+    quality: str = "medium",
+    aovs: tuple[str, ...] = (),
+    *,
+    specular_view: bool = True,
+) -> Plan:
+    """The frame's plan without any GPU. The receivers' light views are then fitted to the receivers, not yet to the landing light.
+
+    Raises:
+        UsageError: unknown method, quality or AOV.
+    """
+    chosen = pick(_named(scene, method))
+    setup = FrameSetup.analyse(scene, size, resolve_options(chosen, quality, {}), transmissive_shadows=chosen is not None)
+    declared = _declare(setup, chosen() if chosen else None, aovs, specular_view, method)
+    return declared.graph.compile(outputs=declared.outputs)
+
+
+def _named(scene: Scene, method: str) -> str:
+    return scene.method if method == AUTO and scene.method else method
+
+
+class Renderer:
+    """Renders one scene.
+
+    Args:
+        scene: see `glcaustics.load_scene`.
+        size: width, height in pixels.
+        method: name of a caustics method, "auto", or "none".
+        quality: a step of the ladder, "draft" to "reference".
+        backend: "auto", "egl", "osmesa" or "glfw"; not used with `context`.
+        context: a host's moderngl context; its state is as it was after every call.
+        target: a host's framebuffer of the same size that the 8-bit picture is copied to.
+        aovs: names of `AOVS` to deliver.
+        specular_view: whether the eye sees specular surfaces; without, AOVs are those of the receivers behind them.
+        seed: of everything random.
+        options: single options on top of the ladder, see `glcaustics methods`.
+        stats: read solves back and count them.
+
+    Raises:
+        UsageError, SceneError, DeviceError, ResourceLimitError: one line each.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        size: tuple[int, int] = (1280, 720),
+        method: str = AUTO,
+        quality: str = "medium",
+        backend: str = "auto",
+        *,
+        context: moderngl.Context | None = None,
+        target: moderngl.Framebuffer | None = None,
+        aovs: tuple[str, ...] = (),
+        specular_view: bool = True,
+        seed: int = 0,
+        options: Mapping[str, Any] | None = None,
+        stats: bool = True,
+    ) -> None:
+        self.scene = scene
+        self.size = (int(size[0]), int(size[1]))
+        self.method_name = _named(scene, method)
+        self.quality = quality
+        self.aovs = tuple(aovs)
+        self.specular_view = specular_view
+        self._target = target
+        self._chosen = pick(self.method_name)
+        resolved = resolve_options(self._chosen, quality, options or {})
+        self._method = self._chosen() if self._chosen else None
+        self._setup = FrameSetup.analyse(
+            scene, self.size, resolved, transmissive_shadows=self._chosen is not None, seed=seed
+        )
+        self._setup.collect_stats = stats
+        _aov_resources(self._setup, self.aovs, False, True)
+        self.device: Device = create_device(backend, context)
+        self.device.timing_enabled = stats
+        self.announcements = [*scene.announcements, *self.device.announcements]
+        self._gpu = GpuScene(self.device)
+        self._runner: PlanRunner | None = None
+        self._declared: _Declared | None = None
+        self._previous: tuple[CameraState, dict[str, Any]] | None = None
+
+    # -- life ---------------------------------------------------------------------------------------------------------
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give all GPU memory back, and the context unless it is the host's."""
+        if self.device.closed:
+            return
+        with self.device.guard_state():
+            if self._runner is not None:
+                self._runner.release()
+            self._gpu.release()
+        self.device.close()
+
+    @property
+    def plan(self) -> Plan:
+        """The compiled frame graph. Prepares the scene if no frame was rendered yet."""
+        with self.device.guard_state():
+            return self._prepared(0.0).plan
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options in force."""
+        return dict(self._setup.options)
+
+    # -- frames -------------------------------------------------------------------------------------------------------
+
+    def render(self, time: float = 0.0) -> Frame:
+        """Render one frame.
+
+        Args:
+            time: seconds; waters and camera paths move with it.
+        """
+        with self.device.guard_state():
+            return self._render(time)
+
+    def draw(self, time: float = 0.0) -> None:
+        """Render one frame without reading anything back: what a window, a host engine or a benchmark calls."""
+        with self.device.guard_state():
+            self._draw(time)
+
+    def _draw(self, time: float) -> PlanRunner:
+        runner = self._prepared(time)
+        frame = self._frame_state(time)
+        runner.run(frame)
+        self._previous = (frame.camera, {i.instance.name: i.world_from_object for i in self._gpu.items})
+        if self._target is not None:
+            self._copy_to_target(runner)
+        return runner
+
+    def _render(self, time: float) -> Frame:
+        self._prepared(time)
+        self.device.ctx.finish()
+        start = clock.perf_counter()
+        runner = self._draw(time)
+        self.device.ctx.finish()
+        frame_ms = 1e3 * (clock.perf_counter() - start)
+        assert self._declared is not None
+        image = self._read(self._declared.radiance, 3)
+        ldr = self._read_bytes("present.ldr")
+        aov = {name: self._aov(name, image) for name in self.aovs}
+        self.device.check_error("after the frame")
+        return Frame(image, ldr, aov, self._stats(runner, time, frame_ms))
+
+    def _prepared(self, time: float) -> PlanRunner:
+        if self._runner is not None:
+            return self._runner
+        frame = self._frame_state(time)
+        if self._method is not None and self._method.why_not(self._setup) is None:
+            enabled, self.device.timing_enabled = self.device.timing_enabled, False
+            self._method.prepare(self.device, self._setup, frame)
+            self.device.timing_enabled = enabled
+        self._declared = _declare(self._setup, self._method, self.aovs, self.specular_view, self.method_name)
+        outputs = self._declared.outputs
+        if self._setup.collect_stats and self._method is not None:
+            outputs = tuple(dict.fromkeys((*outputs, *self._method.stats_resources())))
+        self._runner = PlanRunner(self.device, self._declared.graph.compile(outputs=outputs), self._setup)
+        return self._runner
+
+    def _frame_state(self, time: float) -> FrameState:
+        self._gpu.update(self.scene.instances_at(time))
+        camera = CameraState.make(self.scene.view_at(time), self.size, self._setup.scene_bounds_ws)
+        before, transforms = self._previous or (camera, {})
+        return FrameState(time, camera, before, self._gpu, self._exposure(), transforms)
+
+    def _exposure(self) -> float:
+        """The scene's exposure, or one that shows a white surface in full light a stop above middle grey's."""
+        if self.scene.exposure is not None:
+            return self.scene.exposure
+        centre = self._setup.bounds_ws.mean(axis=0)
+        lux = 0.0
+        for light in self.scene.lights:
+            power = light.intensity * float(np.dot(light.color, (0.2126, 0.7152, 0.0722)))
+            if light.kind is not LightKind.DIRECTIONAL:
+                power /= max(float(np.sum((centre - np.asarray(light.position_ws)) ** 2)), 1e-30)
+            lux += power
+        sky = float(np.dot(self.scene.sky.zenith, (0.2126, 0.7152, 0.0722))) * np.pi
+        return 0.75 * np.pi / max(lux + sky, 1e-30)
+
+    def _copy_to_target(self, runner: PlanRunner) -> None:
+        assert self._target is not None
+        source = self.device.framebuffer([runner.texture("present.ldr")], label="present")
+        self.device.ctx.copy_framebuffer(self._target, source)
+        self.device.release_framebuffers([source])
+
+    # -- read-back ----------------------------------------------------------------------------------------------------
+
+    def _read(self, resource: str, components: int) -> npt.NDArray[np.float32]:
+        assert self._runner is not None
+        texture = self._runner.texture(resource)
+        kind = {"f4": np.float32, "f2": np.float16}[texture.dtype]
+        data = np.frombuffer(texture.read(), kind).reshape(texture.height, texture.width, texture.components)
+        flipped = np.ascontiguousarray(data[::-1, :, :components], np.float32)
+        return flipped[..., 0] if components == 1 else flipped
+
+    def _read_bytes(self, resource: str) -> npt.NDArray[np.uint8]:
+        assert self._runner is not None
+        texture = self._runner.texture(resource)
+        data = np.frombuffer(texture.read(), np.uint8).reshape(texture.height, texture.width, 4)
+        return np.ascontiguousarray(data[::-1, :, :3])
+
+    def _aov(self, name: str, image: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+        assert self._runner is not None and self._declared is not None
+        plan, specular = self._runner.plan, self._declared.specular
+        height, width = self.size[1], self.size[0]
+        if name == "image":
+            return image
+        if name == "caustic_irradiance":
+            resource = "view.caustic_irradiance" if specular else IRRADIANCE
+            return self._read(resource, 3) if resource in plan.slots else np.zeros((height, width, 3), np.float32)
+        if name == "direct_irradiance":
+            return self._read("lighting.irradiance", 3)
+        if name == "albedo":
+            return self._read("gbuffer.albedo", 3)
+        if name == "solve_status":
+            return self._read("view.solve_status", 1) if specular else np.zeros((height, width), np.float32)
+        if name == "normal_ws":
+            normal = self._read("gbuffer.normal_ws", 3)
+            if specular:
+                normal = np.where(self._read("specular.depth_m", 1)[..., None] > 0, self._read("specular.normal_ws", 3), normal)
+            return normal
+        depth = self._read("gbuffer.depth_m", 1)
+        if specular:
+            front = self._read("specular.depth_m", 1)
+            depth = np.where(front > 0, front, depth)
+        return depth if name == "depth_m" else self._positions(depth)
+
+    def _positions(self, depth_m: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+        assert self._previous is not None
+        camera = self._previous[0]
+        height, width = depth_m.shape
+        x = ((np.arange(width) + 0.5) / width * 2 - 1) * camera.lens[0]
+        y = (1 - (np.arange(height) + 0.5) / height * 2) * camera.lens[1]
+        scale = np.ones_like(depth_m, np.float64) if camera.orthographic else depth_m.astype(np.float64)
+        view = np.stack([x[None, :] * scale, y[:, None] * scale, -depth_m.astype(np.float64)], axis=2)
+        m = camera.world_from_camera
+        world = view @ m[:3, :3].T + m[:3, 3]
+        return np.where(depth_m[..., None] > 0, world, 0.0).astype(np.float32)
+
+    def _stats(self, runner: PlanRunner, time: float, frame_ms: float) -> dict[str, Any]:
+        timings = self.device.finish_timings() if self.device.timing_enabled else {}
+        written = runner.step_bytes()
+        solves = self._method.solve_stats(runner) if self._method is not None and self._setup.collect_stats else []
+        flux = sum(s["flux"] for s in solves)
+        return {
+            "scene": self.scene.name,
+            "method": self.method_name if self.method_name != AUTO else (self._method.name if self._method else NONE),
+            "quality": self.quality,
+            "size": list(self.size),
+            "time_s": time,
+            "seed": self._setup.seed,
+            "options": self.options,
+            "backend": self.device.backend,
+            "renderer": self.device.info["renderer"],
+            "timer": self.device.timer_kind,
+            "frame_ms": frame_ms,
+            "passes": [{"name": s.name, "ms": timings.get(s.name), "bytes": written[s.name]} for s in runner.plan.steps],
+            "left_out": [{"name": item.name, "because": item.because} for item in runner.plan.left_out],
+            "bytes_allocated": runner.plan.bytes_allocated,
+            "bytes_without_aliasing": runner.plan.bytes_without_aliasing,
+            "bytes_without_culling": runner.plan.bytes_without_culling,
+            "solves": solves,
+            "lost_flux": sum(s["flux_lost"] for s in solves) / flux if flux > 0 else None,
+        }
