@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from glcaustics.errors import SceneError
+from glcaustics.scene.gltf import load_gltf
 from glcaustics.scene.model import Scene
 from glcaustics.scene.strict_table import nearest
 from glcaustics.scene.toml import load_toml
@@ -53,22 +54,14 @@ def load_scene(name_or_path: str | Path, overrides: Mapping[str, Any] | None = N
     path = Path(text)
     suffix = path.suffix.lower()
     if suffix == ".toml":
-        return _validated(load_toml(path, overrides))
+        return load_toml(path, overrides)
     if suffix in (".glb", ".gltf"):
         if overrides:
             raise SceneError("overrides work on TOML scenes only", where=text, remedy="include the glTF from a .toml")
-        if not path.is_file():
-            raise SceneError("there is no such file", where=text, remedy="check the path")
-        from glcaustics.scene.gltf import load_gltf
-
-        return _validated(load_gltf(path))
+        return load_gltf(path)
     builtin = _builtin_files()
     if text in builtin:
-        return _validated(load_toml(builtin[text], overrides))
+        return load_toml(builtin[text], overrides)
     if path.exists():
         raise SceneError(f"files of kind '{suffix}' are not scenes", where=text, remedy="use .toml, .glb or .gltf")
     raise SceneError(f"unknown scene '{text}'", remedy=nearest(text, builtin) + "; or a .toml, .glb or .gltf file")
-
-
-def _validated(scene: Scene) -> Scene:
-    return scene

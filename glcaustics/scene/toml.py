@@ -6,7 +6,6 @@ table, key, value and remedy. Lengths are metres, angles degrees where the key s
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import re
 import tomllib
@@ -19,10 +18,14 @@ from PIL import Image as PillowImage
 
 from glcaustics.errors import SceneError
 from glcaustics.scene.camera_path import CameraKey, camera_path
+from glcaustics.scene.defaults import complete
+from glcaustics.scene.gltf import GltfContents, read_gltf
+from glcaustics.scene.limits import check_image_size, check_limits
 from glcaustics.scene.model import Camera, Image, Instance, Light, LightKind, Material, Scene, Sky
 from glcaustics.scene.strict_table import StrictTable
 from glcaustics.scene.toml_objects import existing_file, read_object
 from glcaustics.scene.toml_water import read_water
+from glcaustics.scene.validate import validate_scene
 
 QUALITIES = ("draft", "low", "medium", "high", "reference")
 
@@ -34,8 +37,12 @@ def load_toml(path: str | Path, overrides: Mapping[str, Any] | None = None) -> S
         path: the .toml file; the files it names are looked up beside it.
         overrides: values to put in place of the file's, by dotted path, e.g. {"water[0].amplitude_scale": 0.5}.
 
+    Objects of a glTF file named by `gltf` in [scene] come first; its lights and its camera count where the TOML has
+    none of its own. What is missing then is supplied and announced; `light = []` says that darkness is meant.
+
     Raises:
         SceneError: file missing, not TOML, or not a valid scene.
+        ResourceLimitError: larger than `scene.limits` allow.
     """
     path = Path(path)
     try:
@@ -46,7 +53,10 @@ def load_toml(path: str | Path, overrides: Mapping[str, Any] | None = None) -> S
         raise SceneError(f"is not TOML ({cause})", where=str(path), remedy="mend the syntax there") from cause
     for key, value in (overrides or {}).items():
         _override(data, key, value, str(path))
-    return _read_scene(StrictTable(data, str(path)), path)
+    scene = _read_scene(StrictTable(data, str(path)), path)
+    check_limits(scene, where=str(path))
+    validate_scene(scene, where=str(path))
+    return scene
 
 
 def _override(data: dict[str, Any], key: str, value: Any, file: str) -> None:
@@ -64,44 +74,51 @@ def _override(data: dict[str, Any], key: str, value: Any, file: str) -> None:
 
 
 def _read_scene(root: StrictTable, path: Path) -> Scene:
+    folder = path.parent
     head = root.table("scene") or StrictTable({}, root.file, "scene")
-    base = _base_scene(head, path)
+    base = _read_gltf(head, folder)
     values: dict[str, Any] = {
-        "name": head.text("name", path.parent.name if path.stem == "scene" else path.stem),
+        "name": head.text("name", folder.name if path.stem == "scene" else path.stem),
         "purpose": head.text("purpose", ""),
-        "licence": head.text("licence", ""),
+        "licence": head.text("licence", base.copyright),
         "method": head.text("method", None),
         "quality": head.text("quality", None, choices=QUALITIES),
         "exposure": head.number("exposure", None, above=0.0),
     }
     head.finish()
-    sky = root.table("sky")
-    if sky is not None:
-        values["sky"] = _read_sky(sky)
-    camera = root.table("camera")
-    if camera is not None:
-        values["camera"], values["camera_at"] = _read_camera(camera)
-    elif base is None:
-        raise root.error("the table [camera] is missing", "add [camera] with eye and target")
-    lights = root.tables("light")
-    if lights:  # they replace those of the glTF file
-        values["lights"] = tuple(_read_light(t, f"light{i}") for i, t in enumerate(lights))
-    materials = _read_materials(root, path.parent)
-    objects = _read_objects(root, path.parent, materials)
-    waters = tuple(read_water(t, path.parent, materials, f"water{i}") for i, t in enumerate(root.tables("water")))
+    sky_table, camera_table = root.table("sky"), root.table("camera")
+    sky = _read_sky(sky_table) if sky_table is not None else None
+    camera, camera_at = _read_camera(camera_table) if camera_table is not None else (base.camera, None)
+    unlit = root.has("light") and root.data["light"] == []  # `light = []`: darkness is meant
+    lights = tuple(_read_light(t, f"light{i}") for i, t in enumerate(root.tables("light"))) or base.lights
+    materials = _read_materials(root, folder)
+    instances = base.instances + _read_objects(root, folder, materials)
+    waters = tuple(read_water(t, folder, materials, f"water{i}") for i, t in enumerate(root.tables("water")))
     root.finish()
-    if base is not None:
-        return dataclasses.replace(base, instances=base.instances + objects, waters=base.waters + waters, **values)
-    values.setdefault("lights", ())
-    return Scene(instances=objects, waters=waters, **values)
+    everything = (*instances, *(Instance(w.name, w.mesh_at(0.0), w.material, w.world_from_object) for w in waters))
+    if not everything:
+        raise root.error("the scene has no objects", "add [[object]], [[water]] or a gltf file")
+    supplied = complete(everything, lights, camera, sky)
+    announcements = supplied.announcements
+    if unlit:
+        announcements = tuple(note for note in announcements if "no light" not in note)
+    return Scene(
+        instances=instances,
+        waters=waters,
+        lights=() if unlit else supplied.lights,
+        camera=supplied.camera,
+        camera_at=camera_at,
+        sky=supplied.sky,
+        announcements=base.announcements + announcements,
+        **values,
+    )
 
 
-def _base_scene(head: StrictTable, path: Path) -> Scene | None:
+def _read_gltf(head: StrictTable, folder: Path) -> GltfContents:
+    """The glTF file that the scene builds on, or nothing."""
     if not head.has("gltf"):
-        return None
-    from glcaustics.scene.gltf import load_gltf
-
-    return load_gltf(existing_file(head, "gltf", path.parent))
+        return GltfContents((), (), None, (), "")
+    return read_gltf(existing_file(head, "gltf", folder))
 
 
 def _read_sky(table: StrictTable) -> Sky:
@@ -187,6 +204,7 @@ def read_image(path: Path, *, srgb: bool) -> Image:
     """An image file as uint8 RGB or RGBA. Raises SceneError if Pillow cannot read it."""
     try:
         with PillowImage.open(path) as picture:
+            check_image_size(path.name, *picture.size, where=str(path))
             alpha = picture.has_transparency_data
             pixels = np.asarray(picture.convert("RGBA" if alpha else "RGB"))
     except (OSError, ValueError, PillowImage.DecompressionBombError) as cause:

@@ -12,6 +12,7 @@ import numpy as np
 
 from glcaustics.errors import SceneError
 from glcaustics.scene import shapes, shapes_round
+from glcaustics.scene.gltf import read_gltf
 from glcaustics.scene.mesh_tools import crease_normals, nondegenerate
 from glcaustics.scene.model import FloatArray, Instance, Material, Mesh
 from glcaustics.scene.strict_table import StrictTable, nearest
@@ -178,10 +179,8 @@ def read_object(
 def _gltf_instances(
     table: StrictTable, path: Path, name: str, placement: FloatArray, material: Material | None
 ) -> tuple[Instance, ...]:
-    from glcaustics.scene.gltf import load_gltf
-
     table.finish()
     return tuple(
         Instance(f"{name}/{part.name}", part.mesh, material or part.material, placement @ part.world_from_object)
-        for part in load_gltf(path).instances
+        for part in read_gltf(path).instances
     )

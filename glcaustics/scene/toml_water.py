@@ -12,6 +12,7 @@ import numpy.typing as npt
 from PIL import Image as PillowImage
 
 from glcaustics.errors import SceneError
+from glcaustics.scene.limits import check_image_size
 from glcaustics.scene.model import Material, WaterBody
 from glcaustics.scene.strict_table import StrictTable, nearest
 from glcaustics.scene.toml_objects import existing_file
@@ -105,6 +106,7 @@ def read_heights(path: Path) -> npt.NDArray[np.float64]:
     """
     try:
         with PillowImage.open(path) as picture:
+            check_image_size(path.name, *picture.size, where=str(path))
             if picture.mode in ("I;16", "I;16B", "I;16L", "I"):
                 return np.asarray(picture, dtype=np.float64) / 65535.0
             if picture.mode == "F":

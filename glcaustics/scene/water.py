@@ -15,12 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from glcaustics.errors import SceneError
+from glcaustics.scene.limits import check_limit
 from glcaustics.scene.model import Material, Mesh, WaterBody
 
 Array = npt.NDArray[np.float64]
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
-MAX_GRID = 4096  # vertices along one side: 16.8 million in all, 0.9 GB with normals and triangles
+MAX_GRID = 4096  # vertices along one side
+MAX_GRID_VERTICES = 1 << 22  # in all; evaluating the waves takes about 150 bytes a vertex
 
 
 def dispersion_omega(k: float, depth_m: float = math.inf, gravity: float = STANDARD_GRAVITY) -> float:
@@ -215,6 +217,9 @@ class WaterGrid:
 
     The triangles and texture coordinates are made once and shared by all meshes; a surface that does not move gives the
     same Mesh object every time.
+
+    Raises:
+        SceneError, ResourceLimitError: for a resolution out of range.
     """
 
     def __init__(
@@ -225,6 +230,7 @@ class WaterGrid:
             raise SceneError(
                 f"water '{name}': resolution {nx} x {nz}", remedy=f"both numbers must lie in [2, {MAX_GRID}]"
             )
+        check_limit(nx * nz, MAX_GRID_VERTICES, f"water '{name}': vertices", "lower its resolution")
         self.name, self.surface, self.size_m, self.resolution = name, surface, size_m, resolution
         x = np.linspace(-0.5 * size_m[0], 0.5 * size_m[0], nx)
         z = np.linspace(-0.5 * size_m[1], 0.5 * size_m[1], nz)

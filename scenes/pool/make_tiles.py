@@ -71,7 +71,9 @@ def stone(size, slabs, seed):
 
 def beach_ball(size, panels):
     """Coloured panels between white ones, white caps at both poles; u goes once round, v from pole to pole."""
-    colors = np.array([(0.75, 0.05, 0.04), (0.85, 0.84, 0.80), (0.95, 0.55, 0.03), (0.85, 0.84, 0.80), (0.03, 0.16, 0.55)])
+    colors = np.array(
+        [(0.75, 0.05, 0.04), (0.85, 0.84, 0.80), (0.95, 0.55, 0.03), (0.85, 0.84, 0.80), (0.03, 0.16, 0.55)]
+    )
     colors = np.concatenate([colors, colors[1:2]])
     panel = ((np.arange(size) + 0.5) / size * panels).astype(int)
     picture = np.tile(colors[panel % len(colors)][None], (size, 1, 1))
