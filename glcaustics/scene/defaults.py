@@ -14,7 +14,8 @@ SUN_ILLUMINANCE_LUX = 100_000.0  # clear sky at noon
 SUN_DIRECTION = (-0.4, -1.0, -0.3)
 SKY_SHARE = 0.02  # of the lights' illuminance: enough to see into shadows, too little to wash out caustics
 YFOV_RAD = math.radians(40.0)
-GROUND_FACTOR = 3.0  # a thing this many times as large as what stands on it is scenery, not the subject
+# A thing so many times as large as the specular things, or as the median thing, is scenery and not the subject.
+SCENERY_BESIDE_SPECULAR, SCENERY_BESIDE_MEDIAN = 1.5, 3.0
 BLOCKER_TRIANGLES = 200_000  # of all walls looked at when the camera seeks a free view; then every n-th
 # Where the camera looks from, degrees (azimuth from +Z towards +X, elevation); the first with a free view is taken.
 VIEWPOINTS = ((20, 35), (-20, 35), (20, 20), (-20, 20), (65, 35), (-65, 35), (0, 60), (160, 35), (-160, 35), (0, 8))
@@ -112,18 +113,16 @@ def default_camera(instances: Sequence[Instance], lights: Sequence[Light]) -> Ca
 def subject_sphere(instances: Sequence[Instance]) -> Sphere:
     """What the picture is about: the specular things, or else all; with everything that is not far larger than they."""
     boxes = np.array([_box(instance) for instance in instances])  # (N, 2, 3)
+    sizes_m = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1)
     specular = np.array([instance.optical_kind is not OpticalKind.DIFFUSE for instance in instances])
     if specular.any():
-        core = boxes[specular]
-        near = _bounds(core)
-        reach_m = float(np.linalg.norm(near[1] - near[0]))
+        low, high = _bounds(boxes[specular])
+        reach_m, factor = float(np.linalg.norm(high - low)), SCENERY_BESIDE_SPECULAR
     else:
-        core = boxes
-        sizes = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1)
-        reach_m = float(np.median(sizes))
-    sizes = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1)
-    gap = np.maximum(np.maximum(boxes[:, 0] - _bounds(core)[1], _bounds(core)[0] - boxes[:, 1]), 0.0)
-    belongs = (sizes <= GROUND_FACTOR * reach_m) & (np.linalg.norm(gap, axis=1) <= reach_m)
+        low, high = _bounds(boxes)
+        reach_m, factor = float(np.median(sizes_m)), SCENERY_BESIDE_MEDIAN
+    gap_m = np.linalg.norm(np.maximum(np.maximum(boxes[:, 0] - high, low - boxes[:, 1]), 0.0), axis=1)
+    belongs = (sizes_m <= factor * reach_m) & (gap_m <= reach_m)
     if specular.any():
         belongs |= specular
     if not belongs.any():

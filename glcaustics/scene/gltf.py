@@ -105,8 +105,6 @@ def _instances(file: GltfFile, meshes: MeshReader, node: PlacedNode) -> list[Ins
     if "skin" in item.value:
         file.announce(f"node '{item.name}': skinning is not supported, the mesh is drawn unbent")
     matrix = node.world_from_node
-    if not np.isfinite(matrix).all():
-        raise item.error("its world transform is not finite", "set smaller scales and translations")
     mirrored = bool(np.linalg.det(matrix[:3, :3] / max(np.abs(matrix[:3, :3]).max(), 1e-300)) < 0.0)
     if mirrored:  # the mesh is mirrored instead, so that every transform keeps its handedness
         matrix = matrix @ np.diag([-1.0, 1.0, 1.0, 1.0])

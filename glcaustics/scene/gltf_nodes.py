@@ -10,6 +10,7 @@ import numpy as np
 
 from glcaustics.scene.gltf_file import GltfFile
 from glcaustics.scene.gltf_json import Json
+from glcaustics.scene.limits import MAX_COORDINATE_M
 from glcaustics.scene.model import Camera, FloatArray, Light, LightKind
 
 AGAIN = "export the file again"
@@ -40,6 +41,8 @@ def placed_nodes(file: GltfFile) -> Iterator[PlacedNode]:
             raise nodes[number].error("it is reached twice: the nodes are not a tree but have a cycle", AGAIN)
         seen.add(number)
         world_from_node = world_from_parent @ _local_matrix(nodes[number])
+        if not np.abs(world_from_node).max() <= MAX_COORDINATE_M:
+            raise nodes[number].error(f"its world transform goes beyond {MAX_COORDINATE_M:g} m", "scale the scene down")
         yield PlacedNode(nodes[number], world_from_node)
         stack.extend((child, world_from_node) for child in reversed(children[number]))
 

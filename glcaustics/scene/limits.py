@@ -11,6 +11,7 @@ MAX_SCENE_VERTICES = 32_000_000  # the whole scene, instances counted
 MAX_SCENE_TRIANGLES = 64_000_000
 MAX_INSTANCES = 20_000  # one draw call each
 MAX_LIGHTS = 64  # a shadow map each, six for a point light
+MAX_COORDINATE_M = 1e15  # float32 squares of lengths on the GPU stay finite
 MAX_IMAGE_SIDE = 16_384  # texels; what OpenGL drivers commonly take
 MAX_SCENE_TEXELS = 1 << 28  # a gigabyte as RGBA8
 

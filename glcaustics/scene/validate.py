@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from glcaustics.errors import SceneError
+from glcaustics.scene.limits import MAX_COORDINATE_M
 from glcaustics.scene.model import Camera, Image, Instance, Light, LightKind, Material, Mesh, Scene, WaterBody
 
 UNIT_TOLERANCE = 1e-3  # of the length of normals and directions
@@ -112,8 +113,11 @@ def _check_mesh(mesh: Mesh, where: str) -> None:
             remedy = f"give ({count}, {width})"
             raise SceneError(f"{owner}: {name} has shape {values.shape}", where=where, remedy=remedy)
         bad = ~np.isfinite(values).all(axis=1)
+        if name == "positions_m":
+            bad |= np.abs(values).max(axis=1, initial=0.0) > MAX_COORDINATE_M
         if bad.any():
-            what = f"{owner}: {name} of vertex {int(np.flatnonzero(bad)[0])} is not finite"
+            first = int(np.flatnonzero(bad)[0])
+            what = f"{owner}: {name} of vertex {first} is not finite or beyond {MAX_COORDINATE_M:g}"
             raise SceneError(what, where=where, remedy="remove such vertices")
     triangles = mesh.triangles
     if triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) == 0:
@@ -132,8 +136,8 @@ def _check_mesh(mesh: Mesh, where: str) -> None:
 
 
 def _check_matrix(matrix: np.ndarray, owner: str, where: str) -> None:
-    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
-        what = f"{owner}: its transform is not a finite 4x4 matrix"
+    if matrix.shape != (4, 4) or not np.abs(matrix).max() <= MAX_COORDINATE_M:
+        what = f"{owner}: its transform is not a finite 4x4 matrix within {MAX_COORDINATE_M:g}"
         raise SceneError(what, where=where, remedy="give finite numbers")
     if not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=1e-9):
         what = f"{owner}: the last row of its transform is {matrix[3].tolist()}"

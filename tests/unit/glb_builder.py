@@ -146,8 +146,9 @@ def builder(
         placed.append({"camera": number, **node})
     root["nodes"] = [dict(node) for node in nodes] if nodes is not None else placed
     children = {child for node in root["nodes"] for child in node.get("children", [])}
-    root["scenes"] = [{"nodes": [number for number in range(len(root["nodes"])) if number not in children]}]
-    root["scene"] = 0
+    if root["nodes"]:
+        root["scenes"] = [{"nodes": [number for number in range(len(root["nodes"])) if number not in children]}]
+        root["scene"] = 0
     return build
 
 
