@@ -6,18 +6,15 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from glcaustics.errors import SceneError
 from glcaustics.scene import shapes, shapes_round
 from glcaustics.scene.gltf import read_gltf
-from glcaustics.scene.mesh_tools import crease_normals, nondegenerate
+from glcaustics.scene.mesh_file import load_mesh_file
 from glcaustics.scene.model import FloatArray, Instance, Material, Mesh
 from glcaustics.scene.strict_table import StrictTable, nearest
 
-MESH_FILES = (".obj", ".ply", ".stl", ".off")
 GLTF_FILES = (".glb", ".gltf")
 
 
@@ -94,38 +91,6 @@ def _placement(table: StrictTable) -> FloatArray:
         matrix[:3, :3] *= table.number("scale", 1.0, above=0.0)
     matrix[:3, 3] = table.vector("translate", 3, (0.0, 0.0, 0.0))
     return matrix
-
-
-def load_mesh_file(path: Path) -> Mesh:
-    """A .obj, .ply, .stl or .off file as one Mesh; normals from the file, or area-weighted ones.
-
-    Raises:
-        SceneError: file missing, of another kind, unreadable, or without triangles.
-    """
-    import trimesh  # slow to import, and most scenes do without it
-
-    if path.suffix.lower() not in MESH_FILES:
-        kinds = ", ".join(MESH_FILES + GLTF_FILES)
-        raise SceneError(f"mesh files of kind '{path.suffix}' are not read", where=str(path), remedy=f"use {kinds}")
-    try:
-        loaded: Any = trimesh.load(path, process=False, force="mesh")
-    except Exception as cause:  # trimesh lets every parser's own exceptions through
-        raise SceneError(f"mesh cannot be read ({cause})", where=str(path), remedy="export it again") from cause
-    positions, triangles = np.asarray(loaded.vertices, np.float64), np.asarray(loaded.faces)
-    if len(triangles) == 0:
-        raise SceneError("mesh has no triangles", where=str(path), remedy="export it with faces")
-    if not np.isfinite(positions).all():
-        raise SceneError("mesh has a position that is not finite", where=str(path), remedy="repair the file")
-    triangles = triangles[nondegenerate(positions, triangles)]
-    uv = getattr(loaded.visual, "uv", None)
-    uv = np.zeros((len(positions), 2)) if uv is None or len(uv) != len(positions) else np.asarray(uv) * [1, -1] + [0, 1]
-    from_file = "vertex_normals" in loaded._cache  # trimesh's own way to tell; reading the property would compute them
-    normals = np.array(loaded.vertex_normals if from_file else np.zeros_like(positions), np.float64)
-    if not np.linalg.norm(normals, axis=1).all():
-        split = crease_normals(positions, triangles)
-        return shapes.make_mesh(path.stem, positions[split.source], split.normals, uv[split.source], split.triangles)
-    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    return shapes.make_mesh(path.stem, positions, normals, uv, triangles)
 
 
 def _material(table: StrictTable, materials: Mapping[str, Material], default: Material | None) -> Material | None:
