@@ -1,4 +1,4 @@
-"""Every way to get a scene file wrong that we could think of: one line that names file, table, key, value and remedy."""
+"""Ways to get a scene file wrong: each gives one line that names file, table, key, value and remedy."""
 
 from __future__ import annotations
 
