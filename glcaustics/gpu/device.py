@@ -46,9 +46,12 @@ class Device:
         self._max_label = max((self.ctx.max_label_length or 0) - 1, 0)
         self._loader = ShaderLoader(shader_root)
         self._programs: dict[tuple[Any, ...], Program] = {}
-        self._fullscreen: dict[Program, moderngl.VertexArray] = {}
+        self._bufferless: dict[Program, moderngl.VertexArray] = {}
         self._rest: moderngl.Framebuffer | None = None
         self._timers = Timers(self.ctx, self.raw, self.is_software)
+        with guard_state(self.ctx, self.raw, self.info["max_texture_units"], None):
+            self._resting_texture = self.ctx.texture((1, 1), 4)
+            self._resting = self.ctx.framebuffer([self._resting_texture])
         self.check_error("opening the device")
 
     # -- life ---------------------------------------------------------------------------------------------------------
@@ -70,11 +73,13 @@ class Device:
         self.closed = True
         self.make_current()
         self._timers.release()
-        for array in self._fullscreen.values():
+        for array in self._bufferless.values():
             array.release()
         for program in self._programs.values():
             program.release()
-        self._fullscreen.clear()
+        self._bufferless.clear()
+        self._resting.release()
+        self._resting_texture.release()
         self._programs.clear()
         self._opened.close()
 
@@ -132,6 +137,9 @@ class Device:
         limit = self.info["max_draw_buffers"]
         if len(colors) > limit:
             raise ResourceLimitError(f"framebuffer '{label}': {len(colors)} colour attachments, allowed are {limit}")
+        if self.ctx.fbo is not None and isinstance(self.ctx.fbo.mglo, moderngl.InvalidObject):
+            # moderngl binds the last used framebuffer again after making one, though it be released.
+            self._resting.use()
         framebuffer = make_framebuffer(self.ctx, colors, depth, label)
         self._label(framebuffer, label)
         return framebuffer
@@ -225,19 +233,26 @@ class Device:
         viewport: tuple[int, int, int, int] | None = None,
     ) -> None:  # fmt: skip
         """One triangle over the framebuffer (or a part of it): no depth test, no culling, no blending unless asked."""
-        array = self._fullscreen.get(program)
-        if array is None:
-            array = self._fullscreen[program] = self.ctx.vertex_array(program.gl, [])
-        self.draw(array, program, fbo, vertices=3, blend=blend, viewport=viewport)
+        self.draw(self._no_buffers(program), program, fbo, vertices=3, blend=blend, viewport=viewport)
 
     def draw_points(
-        self, program: Program, fbo: moderngl.Framebuffer, count: int, *, blend: str | None = None
+        self,
+        program: Program,
+        fbo: moderngl.Framebuffer,
+        count: int,
+        *,
+        blend: str | None = None,
+        viewport: tuple[int, int, int, int] | None = None,
     ) -> None:
-        """`count` points without any vertex buffer: the vertex shader goes by `gl_VertexID` and sets `gl_PointSize`."""
-        array = self._fullscreen.get(program)
+        """`count` points without buffers: the vertex shader places them by gl_VertexID and sets gl_PointSize."""
+        array = self._no_buffers(program)
+        self.draw(array, program, fbo, mode="points", vertices=count, blend=blend, viewport=viewport, point_size=True)
+
+    def _no_buffers(self, program: Program) -> moderngl.VertexArray:
+        array = self._bufferless.get(program)
         if array is None:
-            array = self._fullscreen[program] = self.ctx.vertex_array(program.gl, [])
-        self.draw(array, program, fbo, mode="points", vertices=count, blend=blend, point_size=True)
+            array = self._bufferless[program] = self.ctx.vertex_array(program.gl, [])
+        return array
 
     def draw(
         self,
@@ -314,7 +329,7 @@ class Device:
         culling, colour masks, pixel store, clip control, and moderngl's own copies of them.
         """
         self.make_current()
-        return guard_state(self.ctx, self.raw, self.info["max_texture_units"])
+        return guard_state(self.ctx, self.raw, self.info["max_texture_units"], self._resting)
 
     def check_error(self, where: str) -> None:
         """Raise DeviceError when OpenGL has recorded an error."""

@@ -142,8 +142,13 @@ _MODERNGL_FLAGS = {
 
 
 @contextmanager
-def guard_state(ctx: moderngl.Context, raw: RawGL, units: int) -> Iterator[None]:
-    """See `Device.guard_state`. `units`: how many texture units our programs may use."""
+def guard_state(ctx: moderngl.Context, raw: RawGL, units: int, resting: moderngl.Framebuffer | None) -> Iterator[None]:
+    """See `Device.guard_state`.
+
+    Args:
+        units: how many texture units our programs may use.
+        resting: a framebuffer that outlives ours, for moderngl to hold on to where the host has used none.
+    """
     framebuffer = ctx.fbo
     color_masks = min(raw.integer(0x8824), 8)
     state = _State(raw, (*range(units), ctx.default_texture_unit), color_masks, ctx.version_code >= 450)
@@ -158,6 +163,7 @@ def guard_state(ctx: moderngl.Context, raw: RawGL, units: int) -> Iterator[None]
             flags |= flag if state.switches[enum] else 0
         ctx.enable_only(flags)
         ctx.fbo = framebuffer
-        if framebuffer is not None:
-            ctx.mglo.fbo = framebuffer.mglo
+        kept = framebuffer if framebuffer is not None else resting
+        if kept is not None and not isinstance(kept.mglo, moderngl.InvalidObject):
+            ctx.mglo.fbo = kept.mglo
         state.restore()
