@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 import moderngl
-import numpy as np
 
-from glcaustics.errors import DeviceError, ResourceLimitError, ShaderError, UsageError
+from glcaustics.errors import DeviceError, ShaderError
 from glcaustics.gpu.backends import Opened
 from glcaustics.gpu.draw import draw
-from glcaustics.gpu.info import device_info, is_software
+from glcaustics.gpu.info import is_software
 from glcaustics.gpu.program import Program
-from glcaustics.gpu.rawgl import RawGL
+from glcaustics.gpu.resources import Resources
 from glcaustics.gpu.shader_source import ShaderLoader, define_text
 from glcaustics.gpu.state_guard import guard_state
-from glcaustics.gpu.texture import make_framebuffer, make_texture, read_texture
 from glcaustics.gpu.timer import Timers
 
 
-class Device:
+class Device(Resources):
     """What the rest of the project sees of the driver. Made by `create_device`.
 
     Attributes:
@@ -35,23 +33,18 @@ class Device:
     """
 
     def __init__(self, opened: Opened, backend: str, announcements: list[str], shader_root: Path | None = None) -> None:
+        super().__init__(opened.ctx)
         self._opened = opened
-        self.ctx = opened.ctx
         self.backend = backend
         self.announcements = announcements
-        self.raw = RawGL(self.ctx)
-        self.info = device_info(self.ctx, self.raw)
         self.is_software = is_software(self.info["renderer"])
         self.closed = False
-        self._max_label = max((self.ctx.max_label_length or 0) - 1, 0)
         self._loader = ShaderLoader(shader_root)
         self._programs: dict[tuple[Any, ...], Program] = {}
         self._bufferless: dict[Program, moderngl.VertexArray] = {}
-        self._rest: moderngl.Framebuffer | None = None
         self._timers = Timers(self.ctx, self.raw, self.is_software)
         with guard_state(self.ctx, self.raw, self.info["max_texture_units"], None):
-            self._resting_texture = self.ctx.texture((1, 1), 4)
-            self._resting = self.ctx.framebuffer([self._resting_texture])
+            self._make_resting_framebuffer()
         self.check_error("opening the device")
 
     # -- life ---------------------------------------------------------------------------------------------------------
@@ -78,8 +71,7 @@ class Device:
         for program in self._programs.values():
             program.release()
         self._bufferless.clear()
-        self._resting.release()
-        self._resting_texture.release()
+        self._release_resting_framebuffer()
         self._programs.clear()
         self._opened.close()
 
@@ -88,92 +80,6 @@ class Device:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    # -- resources ----------------------------------------------------------------------------------------------------
-
-    def texture(
-        self,
-        size: tuple[int, int],
-        format: str,
-        *,
-        filter: str = "nearest",
-        compare: bool = False,
-        label: str = "",
-        data: Any = None,
-        repeat: bool = False,
-        mipmaps: bool = False,
-    ) -> moderngl.Texture:
-        """A 2-D texture, clamped to its edge unless `repeat`.
-
-        Args:
-            size: (width, height) in texels.
-            format: a key of `gpu.texture.FORMATS`; "depth24" and "depth32f" are depth textures.
-            filter: "nearest" or "linear".
-            compare: depth comparison (<=) for `sampler2DShadow`.
-            label: name in messages and graphics debuggers.
-            data: bytes, or array (H, W) or (H, W, C); the first row is the lowest (v = 0).
-            mipmaps: build the mip chain of `data` and filter by it.
-
-        Raises:
-            ResourceLimitError: larger than the driver allows, or the driver has no memory for it.
-            UsageError: unknown format, or data that does not fit.
-        """
-        limit = self.info["max_texture_size"]
-        texture = make_texture(
-            self.ctx, self.raw, limit, size, format, filter=filter, compare=compare, label=label, data=data,
-            repeat=repeat, mipmaps=mipmaps,
-        )  # fmt: skip
-        self._label(texture, label)
-        return texture
-
-    def read(self, texture: moderngl.Texture) -> np.ndarray:
-        """Texels of a texture made here: (H, W, C), or (H, W) with one component; float32 or uint8; row 0 is v = 0."""
-        return read_texture(texture)
-
-    def framebuffer(
-        self, colors: Sequence[moderngl.Texture] = (), depth: moderngl.Texture | None = None, label: str = ""
-    ) -> moderngl.Framebuffer:
-        """A complete framebuffer of the given attachments. Raises DeviceError when the driver calls it incomplete."""
-        limit = self.info["max_draw_buffers"]
-        if len(colors) > limit:
-            raise ResourceLimitError(f"framebuffer '{label}': {len(colors)} colour attachments, allowed are {limit}")
-        if self.ctx.fbo is not None and isinstance(self.ctx.fbo.mglo, moderngl.InvalidObject):
-            # moderngl binds the last used framebuffer again after making one, though it be released.
-            self._resting.use()
-        framebuffer = make_framebuffer(self.ctx, colors, depth, label)
-        self._label(framebuffer, label)
-        return framebuffer
-
-    def release_framebuffers(self, framebuffers: Iterable[moderngl.Framebuffer]) -> None:
-        """Release framebuffers of which one may be bound: moderngl rebinds the bound one later, released or not."""
-        if self._rest is None:
-            self._rest = self.framebuffer([self.texture((1, 1), "rgba8", label="rest")], label="rest")
-        self._rest.use()
-        for framebuffer in framebuffers:
-            framebuffer.release()
-
-    def buffer(self, data: Any = None, label: str = "", *, reserve: int = 0, dynamic: bool = False) -> moderngl.Buffer:
-        """A buffer of bytes or a NumPy array, or of `reserve` bytes. Raises ResourceLimitError when memory is out."""
-        if data is None and reserve < 1:
-            raise UsageError(f"buffer '{label}' has neither data nor a size")
-        payload = np.ascontiguousarray(data).tobytes() if isinstance(data, np.ndarray) else data
-        if payload is not None and len(payload) == 0:
-            raise UsageError(f"buffer '{label}' has no data", remedy="leave out what is empty")
-        self.ctx.clear_errors()
-        buffer = self.ctx.buffer(payload, reserve=reserve, dynamic=dynamic)
-        if self.ctx.error != "GL_NO_ERROR":
-            megabytes = (reserve if payload is None else len(payload)) / 1e6
-            buffer.release()
-            raise ResourceLimitError(
-                f"buffer '{label}': the driver refused {megabytes:.0f} MB", remedy="use a smaller mesh or fewer samples"
-            )
-        buffer.extra = label
-        self._label(buffer, label)
-        return buffer
-
-    def _label(self, thing: Any, label: str) -> None:
-        if label and self.ctx.supports_labels:
-            thing.label = label[: self._max_label]
 
     # -- programs and drawing -----------------------------------------------------------------------------------------
 
