@@ -65,8 +65,8 @@ def stone(size, slabs, seed):
     nx, ny, cover = tiling(size, slabs, 0.008, 0.004)
     level = 1.0 + 0.05 * random.normal(size=(slabs, slabs, 1))
     grain = 1.0 + 0.05 * smooth_noise(size, 9, seed + 1)[..., None] + 0.03 * smooth_noise(size, 40, seed + 2)[..., None]
-    color = np.array([0.66, 0.61, 0.53]) * level[ny, nx] * grain
-    return cover[..., None] * color + (1.0 - cover[..., None]) * np.array([0.36, 0.33, 0.29])
+    color = np.array([0.80, 0.76, 0.69]) * level[ny, nx] * grain
+    return cover[..., None] * color + (1.0 - cover[..., None]) * np.array([0.46, 0.43, 0.39])
 
 
 def beach_ball(size, panels):
@@ -83,8 +83,8 @@ def beach_ball(size, panels):
 
 
 if __name__ == "__main__":
-    white_grout = (0.74, 0.78, 0.78)
-    save("tiles.png", mosaic(1024, 16, (0.42, 0.66, 0.73), 0.05, (0.05, 0.0, -0.02), white_grout, 1), 128)
+    white_grout = (0.80, 0.83, 0.83)
+    save("tiles.png", mosaic(1024, 16, (0.56, 0.76, 0.82), 0.05, (0.05, 0.0, -0.02), white_grout, 1), 128)
     save("border.png", mosaic(512, 8, (0.035, 0.13, 0.28), 0.18, (0.08, 0.03, 0.0), white_grout, 2), 64)
     save("ball.png", beach_ball(384, 6), 8)
     save("stone.png", stone(1024, 4, 3), 64)
