@@ -70,18 +70,24 @@ def resolve_options(method: type[CausticsMethod] | None, quality: str, options: 
         UsageError: unknown quality or option, or a value out of range.
     """
     if quality not in QUALITIES:
-        raise UsageError(f"quality '{quality}' is unknown", where="--quality", remedy=f"use one of {', '.join(QUALITIES)}")
+        raise UsageError(
+            f"quality '{quality}' is unknown", where="--quality", remedy=f"use one of {', '.join(QUALITIES)}"
+        )
     resolved: dict[str, Any] = dict(BASE_LADDER[quality])
     if method is not None:
         resolved |= {**getattr(method, "defaults", {}), **method.ladder[quality]}
     for name, value in options.items():
         if name not in resolved:
-            raise UsageError(f"option '{name}' is unknown", where="--set", remedy=f"there are: {', '.join(sorted(resolved))}")
+            raise UsageError(
+                f"option '{name}' is unknown", where="--set", remedy=f"there are: {', '.join(sorted(resolved))}"
+            )
         resolved[name] = {"true": True, "false": False}.get(value, value) if isinstance(value, str) else value
     for name, base in BASE_LADDER[quality].items():
         value = resolved[name]
         if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 16384:
-            raise UsageError(f"option {name} is {value!r}", where="--set", remedy=f"give a whole number from 1, such as {base}")
+            raise UsageError(
+                f"option {name} is {value!r}", where="--set", remedy=f"give a whole number from 1, such as {base}"
+            )
     if method is not None:
         method.validate(resolved)
     return resolved
@@ -148,7 +154,7 @@ def _declare_caustics(graph: FrameGraph, setup: FrameSetup, method: CausticsMeth
     if method is None:
         graph.leave_out("caustics", f"method {method_name}: light passes straight through water and glass")
         return False
-    because = method.why_not(setup)
+    because = method.why_not(setup.scene)
     if because is None:
         method.declare(graph, setup)
         return True
@@ -171,7 +177,9 @@ def plan_frame(
         UsageError: unknown method, quality or AOV.
     """
     chosen = pick(_named(scene, method))
-    setup = FrameSetup.analyse(scene, size, resolve_options(chosen, quality, {}), transmissive_shadows=chosen is not None)
+    setup = FrameSetup.analyse(
+        scene, size, resolve_options(chosen, quality, {}), transmissive_shadows=chosen is not None
+    )
     declared = _declare(setup, chosen() if chosen else None, aovs, specular_view, method)
     return declared.graph.compile(outputs=declared.outputs)
 
@@ -312,7 +320,7 @@ class Renderer:
         if self._runner is not None:
             return self._runner
         frame = self._frame_state(time)
-        if self._method is not None and self._method.why_not(self._setup) is None:
+        if self._method is not None and self._method.why_not(self.scene) is None:
             enabled, self.device.timing_enabled = self.device.timing_enabled, False
             self._method.prepare(self.device, self._setup, frame)
             self.device.timing_enabled = enabled
@@ -383,7 +391,9 @@ class Renderer:
         if name == "normal_ws":
             normal = self._read("gbuffer.normal_ws", 3)
             if specular:
-                normal = np.where(self._read("specular.depth_m", 1)[..., None] > 0, self._read("specular.normal_ws", 3), normal)
+                normal = np.where(
+                    self._read("specular.depth_m", 1)[..., None] > 0, self._read("specular.normal_ws", 3), normal
+                )
             return normal
         depth = self._read("gbuffer.depth_m", 1)
         if specular:
@@ -420,7 +430,9 @@ class Renderer:
             "renderer": self.device.info["renderer"],
             "timer": self.device.timer_kind,
             "frame_ms": frame_ms,
-            "passes": [{"name": s.name, "ms": timings.get(s.name), "bytes": written[s.name]} for s in runner.plan.steps],
+            "passes": [
+                {"name": s.name, "ms": timings.get(s.name), "bytes": written[s.name]} for s in runner.plan.steps
+            ],
             "left_out": [{"name": item.name, "because": item.because} for item in runner.plan.left_out],
             "bytes_allocated": runner.plan.bytes_allocated,
             "bytes_without_aliasing": runner.plan.bytes_without_aliasing,

@@ -33,11 +33,11 @@ class CausticMap(CausticsMethod):
     summary = "light-space samples of water, glass and mirrors, splatted where their light lands"
     paper = "Shah, Konttinen, Pattanaik 2007: Caustics Mapping: An Image-space Technique for Real-time Caustics"
     ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        "draft": {"caster_size": 96, "map_size": 192, "max_iterations": 6, "march_steps": 12},
-        "low": {"caster_size": 160, "map_size": 320, "max_iterations": 8, "march_steps": 16},
-        "medium": {"caster_size": 288, "map_size": 512, "max_iterations": 10, "march_steps": 24},
-        "high": {"caster_size": 768, "map_size": 1024, "max_iterations": 12, "march_steps": 48},
-        "reference": {"caster_size": 2048, "map_size": 2048, "max_iterations": 16, "march_steps": 96},
+        "draft": {"caster_size": 96, "map_size": 192, "max_iterations": 6, "march_steps": 12, "gather_taps": 1},
+        "low": {"caster_size": 160, "map_size": 320, "max_iterations": 8, "march_steps": 16, "gather_taps": 1},
+        "medium": {"caster_size": 288, "map_size": 512, "max_iterations": 10, "march_steps": 24, "gather_taps": 2},
+        "high": {"caster_size": 768, "map_size": 1024, "max_iterations": 12, "march_steps": 48, "gather_taps": 4},
+        "reference": {"caster_size": 2048, "map_size": 2048, "max_iterations": 16, "march_steps": 96, "gather_taps": 6},
     }
     option_help: ClassVar[Mapping[str, str]] = {
         "caster_size": "the casters' light view has about this^2 texels, one light sample each (8..8192)",
@@ -48,6 +48,7 @@ class CausticMap(CausticsMethod):
         "reflect": "follow reflected light too (true, false)",
         "dispersion": "refract red, green and blue apart where a material disperses (true, false)",
         "naive_flux": "the paper's N.L / V flux instead of the exact one, as a baseline (true, false)",
+        "gather_taps": "of the look-up on each side of a pixel that covers several texels (1..16)",
         "max_radius": "largest splat, texels of the map (2..64)",
     }
     defaults: ClassVar[Mapping[str, Any]] = {
@@ -64,14 +65,25 @@ class CausticMap(CausticsMethod):
 
     @classmethod
     def validate(cls, options: Mapping[str, Any]) -> None:
-        ranges = {"caster_size": (8, 8192), "map_size": (8, 8192), "max_iterations": (1, 64), "march_steps": (0, 512), "max_radius": (2, 64)}
+        ranges = {
+            "caster_size": (8, 8192),
+            "map_size": (8, 8192),
+            "max_iterations": (1, 64),
+            "march_steps": (0, 512),
+            "gather_taps": (1, 16),
+            "max_radius": (2, 64),
+        }
         for name, (low, high) in ranges.items():
             value = options[name]
             if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-                raise UsageError(f"option {name} is {value!r}", where="caustic_map", remedy=f"give a number from {low} to {high}")
+                raise UsageError(
+                    f"option {name} is {value!r}", where="caustic_map", remedy=f"give a number from {low} to {high}"
+                )
         if options["estimate"] not in ESTIMATES:
             raise UsageError(
-                f"option estimate is {options['estimate']!r}", where="caustic_map", remedy=f"use one of {', '.join(ESTIMATES)}"
+                f"option estimate is {options['estimate']!r}",
+                where="caustic_map",
+                remedy=f"use one of {', '.join(ESTIMATES)}",
             )
         for name in ("reflect", "dispersion", "naive_flux"):
             if not isinstance(options[name], bool):
@@ -110,7 +122,9 @@ class CausticMap(CausticsMethod):
         maps = []
         for light in setup.lights:
             if light.caster is None or light.receiver is None or not self.branches(setup, light):
-                graph.leave_out(f"caustic_map{light.resource('')}", "its light reaches no specular surface, or none of it lands")
+                graph.leave_out(
+                    f"caustic_map{light.resource('')}", "its light reaches no specular surface, or none of it lands"
+                )
                 continue
             self.declare_solves(graph, setup, light)
             maps.append(self._declare_splat(graph, setup, light))
@@ -122,7 +136,12 @@ class CausticMap(CausticsMethod):
                 "caustic_map.gather",
                 {IRRADIANCE: self.irradiance_desc(setup)},
                 lambda ctx: self._gather(ctx, lit),
-                reads=("gbuffer.depth_m", "gbuffer.normal_ws", *maps, *(light.resource("receiver.position_ws") for light in lit)),
+                reads=(
+                    "gbuffer.depth_m",
+                    "gbuffer.normal_ws",
+                    *maps,
+                    *(light.resource("receiver.position_ws") for light in lit),
+                ),
                 note="look-up in the caustic maps at the camera's pixels",
             )
         )
@@ -278,6 +297,7 @@ class CausticMap(CausticsMethod):
                     "t_normal_ws": ctx.texture("gbuffer.normal_ws"),
                     "t_receiver_position": ctx.texture(light.resource("receiver.position_ws")),
                     "t_flux": ctx.texture(light.resource("caustic_map.flux")),
+                    "u_max_taps": int(ctx.setup.options["gather_taps"]),
                 }
             )
             ctx.device.draw_fullscreen(program, target, blend="add")

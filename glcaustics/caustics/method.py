@@ -9,7 +9,9 @@ from typing import Any, ClassVar
 from glcaustics.gpu import Device
 from glcaustics.graph import FrameGraph, TextureDesc
 from glcaustics.passes.frame import FrameSetup, FrameState
+from glcaustics.passes.geometry import SPECULAR_KINDS
 from glcaustics.passes.runner import PlanRunner
+from glcaustics.scene.model import OpticalKind, Scene
 
 QUALITIES = ("draft", "low", "medium", "high", "reference")
 
@@ -35,15 +37,21 @@ class CausticsMethod(ABC):
     option_help: ClassVar[Mapping[str, str]] = {}
 
     @classmethod
-    def why_not(cls, setup: FrameSetup) -> str | None:
+    def why_not(cls, scene: Scene) -> str | None:
         """Why this scene does not need the method; None when it does."""
-        if not setup.has_specular:
+        kinds = {instance.optical_kind for instance in scene.instances_at(0.0)}
+        if not kinds & set(SPECULAR_KINDS):
             return "nothing in the scene refracts or reflects"
-        if not setup.has_receivers:
+        if OpticalKind.DIFFUSE not in kinds:
             return "nothing in the scene receives caustics"
-        if all(light.caster is None for light in setup.lights):
-            return "no light reaches a specular surface"
+        if not any(light.shines for light in scene.lights):
+            return "no light shines"
         return None
+
+    @classmethod
+    def applies(cls, scene: Scene) -> bool:
+        """Whether the scene needs the method at all."""
+        return cls.why_not(scene) is None
 
     @classmethod
     @abstractmethod

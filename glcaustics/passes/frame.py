@@ -94,14 +94,14 @@ class FrameSetup:
 
     def _light(self, index: int, light: Light, everything: tuple[Instance, ...]) -> LightSetup:
         setup = LightSetup(index, light)
-        if light.intensity <= 0.0 or not any(c > 0.0 for c in light.color):
+        if not light.shines:
             return setup
         points = points_of(everything)
         blockers = self.shadow_casters(everything, light)
         if blockers:
             setup.shadow = fit_view(light, points_of(blockers), int(self.options["shadow_size"]))
         casters = [i for i in everything if i.optical_kind in SPECULAR_KINDS]
-        if casters and self.has_receivers:
+        if casters and self.has_receivers and "caster_size" in self.options:
             setup.caster = fit_view(light, points_of(casters), int(self.options["caster_size"]), depth_points_ws=points)
             receivers = points_of([i for i in everything if i.optical_kind is OpticalKind.DIFFUSE])
             setup.receiver = fit_view(light, receivers, int(self.options["map_size"]))
@@ -161,7 +161,9 @@ class CameraState:
         """Clip planes fitted to the scene's box, so that depth is well conditioned at any scale."""
         world_from_camera = np.asarray(camera.world_from_camera, np.float64)
         camera_from_world = np.linalg.inv(world_from_camera)
-        corners = np.array([[bounds_ws[i, 0], bounds_ws[j, 1], bounds_ws[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+        corners = np.array(
+            [[bounds_ws[i, 0], bounds_ws[j, 1], bounds_ws[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+        )
         depth = -(corners @ camera_from_world[2, :3] + camera_from_world[2, 3])
         extent = float(np.linalg.norm(bounds_ws[1] - bounds_ws[0]))
         far = max(float(depth.max()), 1e-3 * extent) * 1.001 + 1e-3 * extent

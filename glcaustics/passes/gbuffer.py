@@ -27,7 +27,9 @@ def declare_opaque(graph: FrameGraph, setup: FrameSetup) -> None:
         "gbuffer.depth": TextureDesc("depth24", size),
     }
     graph.add(
-        PassDecl("gbuffer", writes, _draw_opaque, always_writes=("gbuffer.depth",), note="opaque surfaces seen by the eye")
+        PassDecl(
+            "gbuffer", writes, _draw_opaque, always_writes=("gbuffer.depth",), note="opaque surfaces seen by the eye"
+        )
     )
 
 
@@ -62,7 +64,13 @@ def _draw_specular(ctx: PassContext) -> None:
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
     live = ctx.locations(DEPTH_M="specular.depth_m", NORMAL_WS="specular.normal_ws")
     defines = {**NOTHING, **live, "LAYER_SPECULAR": 1, "BACK": 0}
-    _draw(ctx, target, ctx.frame.gpu.select(*SPECULAR_KINDS), defines, {"t_opaque_depth_m": ctx.texture("gbuffer.depth_m")})
+    _draw(
+        ctx,
+        target,
+        ctx.frame.gpu.select(*SPECULAR_KINDS),
+        defines,
+        {"t_opaque_depth_m": ctx.texture("gbuffer.depth_m")},
+    )
 
 
 def declare_back(graph: FrameGraph, setup: FrameSetup) -> None:

@@ -89,7 +89,9 @@ class GpuScene:
                 old.index = index
                 items.append(old)
                 continue
-            gpu_mesh = self._mesh(instance.mesh, old.mesh if old is not None and id(old.mesh.mesh) not in wanted else None)
+            gpu_mesh = self._mesh(
+                instance.mesh, old.mesh if old is not None and id(old.mesh.mesh) not in wanted else None
+            )
             m = instance.world_from_object
             linear = m[:3, :3]
             normal = np.linalg.inv(linear).T * np.cbrt(abs(np.linalg.det(linear)))
@@ -183,7 +185,12 @@ class GpuScene:
             if per_item is not None:
                 per_item(chosen, item)
             self.device.draw(
-                item.mesh.array(self.device, chosen), chosen, target, depth_func=depth_func, cull=cull, viewport=viewport
+                item.mesh.array(self.device, chosen),
+                chosen,
+                target,
+                depth_func=depth_func,
+                cull=cull,
+                viewport=viewport,
             )
 
     def release(self) -> None:

@@ -52,7 +52,9 @@ def declare_caster_back(graph: FrameGraph, setup: FrameSetup, light: LightSetup)
     assert light.caster is not None
     size = light.caster.size
     front = light.resource("caster.position_ws")
-    position, normal, depth = (light.resource(f"caster.{n}") for n in ("back_position_ws", "back_normal_ws", "back_depth"))
+    position, normal, depth = (
+        light.resource(f"caster.{n}") for n in ("back_position_ws", "back_normal_ws", "back_depth")
+    )
     graph.add(
         PassDecl(
             f"caster_back{light.resource('')}",

@@ -15,7 +15,9 @@ import numpy as np
 
 from glcaustics.scene.model import FloatArray, Light, LightKind
 
-MAX_TANGENT = 2.2  # widest half angle of a single frustum, 65 degrees: beyond, a texel at the rim is a tenth of one at the axis
+MAX_TANGENT = (
+    2.2  # widest half angle of a single frustum, 65 degrees: beyond, a texel at the rim is a tenth of one at the axis
+)
 CUBE_FORWARD = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float64)
 CUBE_UP = np.array([[0, 1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1], [0, 1, 0], [0, 1, 0]], np.float64)
 
@@ -151,14 +153,19 @@ def light_axis(light: Light, points_ws: FloatArray) -> FloatArray:
     return np.array([0.0, -1.0, 0.0])
 
 
-def depth_range(depths: FloatArray, *, positional: bool) -> tuple[float, float]:
-    """Near and far plane with some air around the depths; relative to their size, so that scale does not matter."""
+def depth_range(depths: FloatArray, extent_m: float, *, positional: bool) -> tuple[float, float]:
+    """Near and far plane with some air around the depths, in proportion to the scene's extent, so that scale does not matter."""
     lo, hi = float(np.min(depths)), float(np.max(depths))
-    air = 0.01 * max(hi - lo, 1e-6 * max(abs(lo), abs(hi)), 1e-30)
+    air = max(0.01 * (hi - lo), 1e-3 * extent_m, 1e-30)
     if positional:
         far = max(hi, 1e-30) + air
         return max(lo - air, 2e-4 * far), far
     return lo - air, hi + air
+
+
+def _extent(points: FloatArray) -> float:
+    """Diagonal of the points' box, metres."""
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def fit_view(
@@ -198,7 +205,7 @@ def _fit_directional(
     if size is None:
         size = fit_size(texels, extent_u / max(extent_v, 1e-30))
     rect = _grow(np.array([u.min(), u.max(), v.min(), v.max()]), size, border)
-    near, far = depth_range((depths - origin) @ forward, positional=False)
+    near, far = depth_range((depths - origin) @ forward, _extent(depths), positional=False)
     matrix = orthographic(*rect, near, far) @ _affine(right, up, forward, origin)
     measure = (rect[1] - rect[0]) * (rect[3] - rect[2]) / (size[0] * size[1])
     along = float(origin @ forward)
@@ -230,7 +237,7 @@ def _fit_frustum(
     if size is None:
         size = fit_size(texels, float(np.ptp(u)) / max(float(np.ptp(v)), 1e-30))
     rect = _grow(np.array([u.min(), u.max(), v.min(), v.max()]), size, border)
-    near, far = depth_range((depths - position) @ forward, positional=True)
+    near, far = depth_range((depths - position) @ forward, _extent(depths), positional=True)
     matrix = perspective(*rect, near, far) @ _affine(right, up, forward, position)
     measure = (rect[1] - rect[0]) * (rect[3] - rect[2]) / (size[0] * size[1])
     return LightView(light, 1, size, (matrix,), measure, forward, right, up, rect, near, far)

@@ -10,7 +10,12 @@ from glcaustics.passes.light_views import fit_view, light_uniforms
 from glcaustics.scene.model import OpticalKind
 
 SHADER = "passes/rsm/rsm"
-ATTACHMENTS = {"depth_m": ("r32f", "m"), "normal_ws": ("rgba32f", ""), "flux": ("rgba32f", "lm"), "material": ("rg16f", "")}
+ATTACHMENTS = {
+    "depth_m": ("r32f", "m"),
+    "normal_ws": ("rgba32f", ""),
+    "flux": ("rgba32f", "lm"),
+    "material": ("rg16f", ""),
+}
 
 
 def declare(graph: FrameGraph, setup: FrameSetup, light: LightSetup, *, with_specular: bool) -> None:
@@ -39,7 +44,9 @@ def declare(graph: FrameGraph, setup: FrameSetup, light: LightSetup, *, with_spe
         def program(item: DrawItem) -> Program:
             image = item.instance.material.base_color_image
             made = ctx.device.program(SHADER, {**outputs, "HAS_UV": int(image is not None and outputs["HAS_FLUX"])})
-            made.set_all({**light_uniforms(light.light), "u_rsm_texel_measure": view.texel_measure, "u_near_m": view.near_m})
+            made.set_all(
+                {**light_uniforms(light.light), "u_rsm_texel_measure": view.texel_measure, "u_near_m": view.near_m}
+            )
             made.set_all({"t_objects": ctx.frame.gpu.objects})
             if image is not None:
                 made.set_all({"t_base_color": ctx.frame.gpu.image(image)})

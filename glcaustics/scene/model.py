@@ -146,6 +146,11 @@ class Light:
     inner_cone_rad: float = 0.0
     outer_cone_rad: float = math.pi / 4
 
+    @property
+    def shines(self) -> bool:
+        """Whether it gives any light at all."""
+        return self.intensity > 0.0 and any(c > 0.0 for c in self.color)
+
 
 @dataclass(frozen=True, eq=False)
 class Camera:

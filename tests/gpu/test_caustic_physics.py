@@ -21,8 +21,7 @@ import pytest
 import glcaustics as glc
 from glcaustics.caustics.registry import METHODS
 from glcaustics.optics.pixels import box_filter
-from glcaustics.passes.frame import FrameSetup
-from glcaustics.renderer import Frame, resolve_options
+from glcaustics.renderer import Frame
 from glcaustics.scene.model import Scene
 from glcaustics.scene.transform import scaled
 from tests.gpu.physics_scenes import BINS, CASES, PhysicsCase, bin_centres
@@ -47,8 +46,7 @@ case_of = cache(lambda name: CASES[name]())
 def refuse_if_it_does_not_apply(scene: Scene, method: str) -> None:
     """Skip where the method itself says that it has nothing to do in such a scene."""
     chosen = METHODS[method]
-    options = resolve_options(chosen, "high", {})
-    because = chosen.why_not(FrameSetup.analyse(scene, SIZE, options, transmissive_shadows=True, seed=0))
+    because = chosen.why_not(scene)
     if because:
         pytest.skip(f"{method} leaves out {scene.name}: {because}")
 

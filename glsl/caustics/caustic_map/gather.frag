@@ -7,6 +7,7 @@ uniform sampler2D t_depth_m;
 uniform sampler2D t_normal_ws;
 uniform sampler2D t_receiver_position;
 uniform sampler2D t_flux;
+uniform int u_max_taps;     // per axis
 
 in vec2 v_uv;
 layout(location = 0) out vec4 o_irradiance;  // W/m^2 or lux
@@ -21,21 +22,14 @@ float same_surface(GlcView view, vec3 p_ws, vec3 n_ws, vec3 l, float width, ivec
     return abs(dot(off, n_ws)) < 2.0 * width && length(off) < 4.0 * width / cos_l ? 1.0 : 0.0;
 }
 
-void main() {
-    o_irradiance = vec4(0.0);
-    float depth_m = texelFetch(t_depth_m, ivec2(gl_FragCoord.xy), 0).r;
-    if (depth_m <= 0.0) return;
-    vec3 p = glc_camera_position_ws(v_uv, depth_m);
-    vec3 n = texelFetch(t_normal_ws, ivec2(gl_FragCoord.xy), 0).xyz;
-    GlcView view = glc_receiver_view();
+// Irradiance at p, bilinear over the texels that hold its surface; w = 1 where there is one.
+vec4 irradiance_at(GlcView view, vec3 p, vec3 n) {
     vec3 l = glc_light_direction(view, p);
     // A two-sided sheet is lit on the side that the eye sees; the map holds the side that the light sees.
     float cos_l = dot(n, -l);
-    if (cos_l <= 0.0) return;
     vec3 projected = glc_view_project(view, p);
-    if (!glc_view_inside(view, projected)) return;
+    if (cos_l <= 0.0 || !glc_view_inside(view, projected)) return vec4(0.0);
     float width = glc_texel_width(view, p);
-
     vec2 at = projected.xy - 0.5;
     ivec2 base = ivec2(floor(at));
     vec2 f = at - vec2(base);
@@ -55,6 +49,39 @@ void main() {
         flux += w * texelFetch(t_flux, texel, 0).rgb;
         total += w;
     }
-    if (total < 0.05) return;
-    o_irradiance = vec4(flux / total * cos_l / glc_texel_cross_section(view, p), 1.0);
+    if (total < 0.05) return vec4(0.0);
+    return vec4(flux / total * cos_l / glc_texel_cross_section(view, p), 1.0);
+}
+
+// The point of the tangent plane at p that another place of the pixel sees.
+vec3 on_plane(vec2 uv, vec3 p, vec3 n, float depth_m) {
+    vec3 q = glc_camera_position_ws(uv, depth_m);
+    vec3 ray = glc_camera_ray_ws(uv);
+    float d_n = dot(ray, n);
+    return abs(d_n) > 0.05 ? q + ray * (dot(p - q, n) / d_n) : q;
+}
+
+void main() {
+    o_irradiance = vec4(0.0);
+    float depth_m = texelFetch(t_depth_m, ivec2(gl_FragCoord.xy), 0).r;
+    if (depth_m <= 0.0) return;
+    vec3 p = glc_camera_position_ws(v_uv, depth_m);
+    vec3 n = texelFetch(t_normal_ws, ivec2(gl_FragCoord.xy), 0).xyz;
+    GlcView view = glc_receiver_view();
+    vec3 centre = glc_view_project(view, p);
+    if (!glc_view_inside(view, centre)) return;
+    // A pixel that covers several texels takes their mean, or fold lines one texel wide would flicker and lose energy.
+    vec2 pixel = 1.0 / vec2(textureSize(t_depth_m, 0));
+    int face = glc_view_face(view, p);
+    vec2 across = glc_view_project_on(view, on_plane(v_uv + vec2(pixel.x, 0.0), p, n, depth_m), face).xy - centre.xy;
+    vec2 along = glc_view_project_on(view, on_plane(v_uv + vec2(0.0, pixel.y), p, n, depth_m), face).xy - centre.xy;
+    ivec2 taps = clamp(ivec2(ceil(vec2(length(across), length(along)) - 0.25)), ivec2(1), ivec2(u_max_taps));
+    vec4 sum = vec4(0.0);
+    for (int j = 0; j < taps.y; ++j)
+        for (int i = 0; i < taps.x; ++i) {
+            vec2 offset = (vec2(i, j) + 0.5) / vec2(taps) - 0.5;
+            vec3 q = taps == ivec2(1) ? p : on_plane(v_uv + offset * pixel, p, n, depth_m);
+            sum += irradiance_at(view, q, n);
+        }
+    o_irradiance = sum.w > 0.0 ? vec4(sum.rgb / float(taps.x * taps.y), 1.0) : vec4(0.0);
 }
