@@ -45,8 +45,7 @@ case_of = cache(lambda name: CASES[name]())
 
 def refuse_if_it_does_not_apply(scene: Scene, method: str) -> None:
     """Skip where the method itself says that it has nothing to do in such a scene."""
-    chosen = METHODS[method]
-    because = chosen.why_not(scene)
+    because = METHODS[method].why_not(scene)
     if because:
         pytest.skip(f"{method} leaves out {scene.name}: {because}")
 
