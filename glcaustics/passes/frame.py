@@ -14,7 +14,7 @@ from glcaustics.gpu import Device
 from glcaustics.graph import Step, check_read, check_write
 from glcaustics.passes.geometry import SPECULAR_KINDS, GpuScene, points_of
 from glcaustics.passes.light_views import LightView, fit_view, orthographic, perspective, unit
-from glcaustics.scene.model import Camera, FloatArray, Instance, Light, LightKind, OpticalKind, Scene
+from glcaustics.scene.model import Camera, FloatArray, Instance, IntArray, Light, LightKind, OpticalKind, Scene
 
 SAMPLE_TIMES_S = (0.0, 1.3, 2.9, 5.3)  # where an animated water is looked at to bound its motion
 
@@ -28,6 +28,7 @@ class LightSetup:
     shadow: LightView | None = None
     caster: LightView | None = None
     receiver: LightView | None = None
+    grounds: frozenset[int] = frozenset()  # identities of the instances that can throw no shadow
 
     def resource(self, name: str) -> str:
         """A resource of this light: "caster.normal_ws@0"."""
@@ -97,7 +98,8 @@ class FrameSetup:
         if not light.shines:
             return setup
         points = points_of(everything)
-        blockers = self.shadow_casters(everything, light)
+        setup.grounds = _grounds(everything, light)
+        blockers = [i for i in everything if self.throws_shadow(i, setup)]
         if blockers:
             setup.shadow = fit_view(light, points_of(blockers), int(self.options["shadow_size"]))
         casters = [i for i in everything if i.optical_kind in SPECULAR_KINDS]
@@ -111,30 +113,52 @@ class FrameSetup:
         """Whether direct light ends at this instance."""
         return self.transmissive_shadows or instance.optical_kind in (OpticalKind.DIFFUSE, OpticalKind.MIRROR)
 
-    def shadow_casters(self, everything: tuple[Instance, ...], light: Light) -> list[Instance]:
-        """Instances that can throw a shadow on something: a flat ground with everything on the light's side cannot."""
-        blockers = [i for i in everything if self.blocks_light(i)]
-        return [i for i in blockers if not _is_ground(i, everything, light)]
+    def throws_shadow(self, instance: Instance, light: LightSetup) -> bool:
+        """Whether an instance can cut this light off from something."""
+        return self.blocks_light(instance) and id(instance) not in light.grounds
 
 
-def _is_ground(instance: Instance, everything: tuple[Instance, ...], light: Light) -> bool:
-    """A plane with nothing behind it, seen from the light."""
-    points = instance.positions_ws()
-    if len(points) > 4096:
-        return False
-    low, high = points.min(axis=0), points.max(axis=0)
-    extent = float(np.linalg.norm(high - low))
-    _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
-    normal, origin = axes[2], points.mean(axis=0)
-    if float(np.abs((points - origin) @ normal).max()) > 1e-5 * extent:
-        return False
-    if light.kind is LightKind.DIRECTIONAL:
-        side = -float(np.asarray(light.direction_ws) @ normal)
-    else:
-        side = float((np.asarray(light.position_ws) - origin) @ normal)
-    normal = normal if side >= 0.0 else -normal
-    others = points_of([i for i in everything if i is not instance])
-    return len(others) == 0 or bool(((others - origin) @ normal).min() > -1e-4 * extent)
+def _grounds(everything: tuple[Instance, ...], light: Light) -> frozenset[int]:
+    """Identities of the instances that can throw no shadow: floors and walls at the scene's far side.
+
+    A plane separates such a convex body from everything else and from the light, so that no ray from the light to
+    anything else meets it; and a convex body throws no shadow on its own lit side. Kept out of the shadow map, a wide
+    floor does not thin out its texels.
+    """
+    parts = [instance.positions_ws() for instance in everything]
+    found = set()
+    for index, (instance, points) in enumerate(zip(everything, parts, strict=True)):
+        others = parts[:index] + parts[index + 1 :]
+        if len(instance.mesh.triangles) <= 64 and _is_behind_all(points, instance.mesh.triangles, others, light):
+            found.add(id(instance))
+    return frozenset(found)
+
+
+def _is_behind_all(points: FloatArray, triangles: IntArray, others: list[FloatArray], light: Light) -> bool:
+    a, b, c = (points[triangles[:, i].astype(np.int64)] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+    faces = lengths > 1e-12 * extent * extent
+    normals, origins = normals[faces] / lengths[faces, None], a[faces]
+    beyond = points @ normals.T - np.sum(normals * origins, axis=1)
+    if not len(normals) or float(beyond.max()) > 1e-4 * extent:
+        return False  # not convex
+    for normal, origin in _unique_planes(normals, origins, flat=float(np.abs(beyond).max()) <= 1e-4 * extent):
+        if light.kind is LightKind.DIRECTIONAL:
+            side = -float(np.asarray(light.direction_ws) @ normal)
+        else:
+            side = float((np.asarray(light.position_ws) - origin) @ normal)
+        if side > 0.0 and all(float(((p - origin) @ normal).min()) > -1e-4 * extent for p in others):
+            return True
+    return False
+
+
+def _unique_planes(normals: FloatArray, origins: FloatArray, *, flat: bool) -> list[tuple[FloatArray, FloatArray]]:
+    """Face planes without repetition; a flat sheet has two sides."""
+    _, first = np.unique(np.round(normals, 5), axis=0, return_index=True)
+    planes = [(normals[k], origins[k]) for k in first]
+    return planes + [(-n, o) for n, o in planes] if flat else planes
 
 
 def _box(points: FloatArray) -> FloatArray:

@@ -23,9 +23,7 @@ def _execute(ctx: PassContext, light: LightSetup, resource: str) -> None:
     target = ctx.target(depth=resource)
     target.clear(depth=1.0)
     program = ctx.device.program(SHADER)
-    casters = ctx.setup.shadow_casters(tuple(i.instance for i in ctx.frame.gpu.items), light.light)
-    wanted = {id(instance) for instance in casters}
-    items = [item for item in ctx.frame.gpu.items if id(item.instance) in wanted]
+    items = [item for item in ctx.frame.gpu.items if ctx.setup.throws_shadow(item.instance, light)]
     for matrix, viewport in zip(light.shadow.matrices, light.shadow.viewports(), strict=True):
         ctx.frame.gpu.draw(
             program,
