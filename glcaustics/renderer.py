@@ -279,23 +279,48 @@ class Renderer:
 
     # -- frames -------------------------------------------------------------------------------------------------------
 
-    def render(self, time: float = 0.0) -> Frame:
+    def render(self, time: float = 0.0, samples: int = 1) -> Frame:
         """Render one frame.
 
         Args:
             time: seconds; waters and camera paths move with it.
+            samples: pictures with the camera shifted by parts of a pixel, averaged (anti-aliasing). AOVs are those of the
+                first, unshifted one; `stats["frame_ms"]` is the median over the samples.
+
+        Raises:
+            UsageError: samples below 1.
         """
+        if samples < 1:
+            raise UsageError(f"{samples} samples a pixel", where="samples", remedy="give at least 1")
         with self.device.guard_state():
-            return self._render(time)
+            frame = self._render(time)
+            return frame if samples == 1 else self._average(frame, time, samples)
+
+    def _average(self, first: Frame, time: float, samples: int) -> Frame:
+        """The mean over shifted pictures; the 8-bit picture's is taken after tone mapping, so that highlights do not alias."""
+        image, ldr = first.image.astype(np.float64), first.ldr.astype(np.float64)
+        times_ms = [first.stats["frame_ms"]]
+        for index in range(1, samples):
+            jitter = (_halton(index, 2) - 0.5, _halton(index, 3) - 0.5)
+            start = clock.perf_counter()
+            self._draw(time, jitter)
+            self.device.ctx.finish()
+            times_ms.append(1e3 * (clock.perf_counter() - start))
+            assert self._declared is not None
+            image += self._read(self._declared.radiance, 3)
+            ldr += self._read_bytes("present.ldr")
+        first.stats |= {"frame_ms": float(np.median(times_ms)), "samples": samples}
+        rounded = np.rint(ldr / samples).astype(np.uint8)
+        return Frame((image / samples).astype(np.float32), rounded, first.aov, first.stats)
 
     def draw(self, time: float = 0.0) -> None:
         """Render one frame without reading anything back: what a window, a host engine or a benchmark calls."""
         with self.device.guard_state():
             self._draw(time)
 
-    def _draw(self, time: float) -> PlanRunner:
+    def _draw(self, time: float, jitter_px: tuple[float, float] = (0.0, 0.0)) -> PlanRunner:
         runner = self._prepared(time)
-        frame = self._frame_state(time)
+        frame = self._frame_state(time, jitter_px)
         runner.run(frame)
         self._previous = (frame.camera, {i.instance.name: i.world_from_object for i in self._gpu.items})
         if self._target is not None:
@@ -331,9 +356,9 @@ class Renderer:
         self._runner = PlanRunner(self.device, self._declared.graph.compile(outputs=outputs), self._setup)
         return self._runner
 
-    def _frame_state(self, time: float) -> FrameState:
+    def _frame_state(self, time: float, jitter_px: tuple[float, float] = (0.0, 0.0)) -> FrameState:
         self._gpu.update(self.scene.instances_at(time))
-        camera = CameraState.make(self.scene.view_at(time), self.size, self._setup.scene_bounds_ws)
+        camera = CameraState.make(self.scene.view_at(time), self.size, self._setup.scene_bounds_ws, jitter_px)
         before, transforms = self._previous or (camera, {})
         return FrameState(time, camera, before, self._gpu, self._exposure(), transforms)
 
@@ -349,7 +374,7 @@ class Renderer:
                 power /= max(float(np.sum((centre - np.asarray(light.position_ws)) ** 2)), 1e-30)
             lux += power
         sky = float(np.dot(self.scene.sky.zenith, (0.2126, 0.7152, 0.0722))) * np.pi
-        return 0.75 * np.pi / max(lux + sky, 1e-30)
+        return 1.3 * np.pi / max(lux + sky, 1e-30)
 
     def _copy_to_target(self, runner: PlanRunner) -> None:
         assert self._target is not None
@@ -424,6 +449,7 @@ class Renderer:
             "quality": self.quality,
             "size": list(self.size),
             "time_s": time,
+            "samples": 1,
             "seed": self._setup.seed,
             "options": self.options,
             "backend": self.device.backend,
@@ -440,3 +466,13 @@ class Renderer:
             "solves": solves,
             "lost_flux": sum(s["flux_lost"] for s in solves) / flux if flux > 0 else None,
         }
+
+
+def _halton(index: int, base: int) -> float:
+    """Element of the Halton sequence (Halton 1960), in [0, 1)."""
+    value, fraction = 0.0, 1.0
+    while index > 0:
+        fraction /= base
+        value += fraction * (index % base)
+        index //= base
+    return value

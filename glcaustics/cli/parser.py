@@ -97,6 +97,13 @@ def _add_render_options(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--frames", type=positive_int, default=1, metavar="N", help="number of frames (default: 1)")
     command.add_argument("--fps", type=positive, default=30.0, metavar="F", help="frames a second (default: 30)")
+    command.add_argument(
+        "--samples",
+        type=positive_int,
+        default=4,
+        metavar="N",
+        help="shifted pictures averaged against aliasing (default: 4)",
+    )
     command.add_argument("--seed", type=seed, default=0, metavar="N", help="seed of everything random (default: 0)")
     command.add_argument("--backend", choices=BACKENDS, default="auto", help="how to get OpenGL (default: auto)")
     command.add_argument("--json", metavar="FILE", help="write the frame's numbers as JSON; '-' for standard output")

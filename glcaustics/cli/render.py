@@ -101,7 +101,7 @@ def _render_frames(renderer: Renderer, job: Job) -> list[dict[str, Any]]:
     progress = Progress(len(job.paths))
     for index, path in enumerate(job.paths):
         time_s = args.time + index / args.fps
-        frame = renderer.render(time=time_s)
+        frame = renderer.render(time=time_s, samples=job.args.samples)
         _store(frame, path, job.aovs)
         records.append({"index": index, "time_s": time_s, "file": str(path), "stats": frame.stats})
         progress.step(index + 1, path)

@@ -179,10 +179,17 @@ class CameraState:
     clip_from_world: FloatArray
     lens: tuple[float, float, float, float]
     orthographic: bool
+    jitter_uv: tuple[float, float] = (0.0, 0.0)
 
     @staticmethod
-    def make(camera: Camera, size: tuple[int, int], bounds_ws: FloatArray) -> CameraState:
-        """Clip planes fitted to the scene's box, so that depth is well conditioned at any scale."""
+    def make(
+        camera: Camera, size: tuple[int, int], bounds_ws: FloatArray, jitter_px: tuple[float, float] = (0.0, 0.0)
+    ) -> CameraState:
+        """Clip planes fitted to the scene's box, so that depth is well conditioned at any scale.
+
+        Args:
+            jitter_px: shift of the picture by a part of a pixel, for anti-aliasing over several samples.
+        """
         world_from_camera = np.asarray(camera.world_from_camera, np.float64)
         camera_from_world = np.linalg.inv(world_from_camera)
         corners = np.array(
@@ -201,12 +208,16 @@ class CameraState:
             tangent = float(np.tan(0.5 * camera.yfov_rad))
             lens = (tangent * aspect, tangent)
             projection = perspective(-lens[0], lens[0], -lens[1], lens[1], near, far)
+        jitter_uv = (jitter_px[0] / size[0], jitter_px[1] / size[1])
+        shift = np.eye(4)
+        shift[0, 3], shift[1, 3] = 2.0 * jitter_uv[0], 2.0 * jitter_uv[1]
         return CameraState(
             world_from_camera,
             camera_from_world,
-            projection @ camera_from_world,
+            shift @ projection @ camera_from_world,
             (*lens, 1.0 if camera.orthographic else 0.0, 0.0),
             camera.orthographic,
+            jitter_uv,
         )
 
     def uniforms(self) -> dict[str, Any]:
@@ -214,6 +225,7 @@ class CameraState:
         return {
             "u_world_from_camera": self.world_from_camera,
             "u_camera_lens": self.lens,
+            "u_camera_jitter": self.jitter_uv,
             "u_camera_clip_from_world": self.clip_from_world,
             "u_camera_from_world": self.camera_from_world,
             "u_eye_ws": tuple(self.world_from_camera[:3, 3]),

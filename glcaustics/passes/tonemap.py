@@ -5,7 +5,7 @@ from __future__ import annotations
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes.frame import FrameSetup, PassContext
 
-LOOK_POWER = 1.2  # AgX "punchy": power and saturation after the base contrast
+LOOK_POWER = 1.25  # AgX "punchy": power and saturation after the base contrast
 LOOK_SATURATION = 1.25
 
 
