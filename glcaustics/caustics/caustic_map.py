@@ -253,7 +253,9 @@ class CausticMap(CausticsMethod):
 
     def _footprint(self, ctx: PassContext, light: LightSetup, branch: Branch) -> None:
         assert light.caster is not None and light.receiver is not None
-        program = ctx.device.program(f"{SHADERS}/footprint", {"RECEIVER_FACES": light.receiver.faces})
+        program = ctx.device.program(
+            f"{SHADERS}/footprint", {"RECEIVER_FACES": light.receiver.faces, "CASTER_FACES": light.caster.faces}
+        )
         program.set_all(
             {
                 "t_landing": ctx.texture(branch.landing),
@@ -270,6 +272,7 @@ class CausticMap(CausticsMethod):
         target = ctx.target(resource)
         target.clear(0.0, 0.0, 0.0, 0.0)
         width, height = light.caster.size
+        copies = 3 if light.receiver.faces == 6 else 1  # a splat can reach three faces of a cube
         for branch in branches:
             program = ctx.device.program(f"{SHADERS}/splat", {"RECEIVER_FACES": light.receiver.faces})
             program.set_all(
@@ -278,10 +281,11 @@ class CausticMap(CausticsMethod):
                     "t_conic": ctx.texture(branch.conic),
                     "t_flux": ctx.texture(branch.flux),
                     "u_width": width,
+                    "u_count": width * height,
                     "u_map_size": (float(light.receiver.size[0]), float(light.receiver.size[1])),
                 }
             )
-            ctx.device.draw_points(program, target, width * height, blend="add")
+            ctx.device.draw_points(program, target, copies * width * height, blend="add")
 
     def _gather(self, ctx: PassContext, lit: list[LightSetup]) -> None:
         target = ctx.target(IRRADIANCE)

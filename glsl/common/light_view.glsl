@@ -49,7 +49,14 @@ vec3 glc_view_project_on(GlcView view, vec3 p_ws, int face) {
 }
 
 vec3 glc_view_project(GlcView view, vec3 p_ws) {
-    return glc_view_project_on(view, p_ws, glc_view_face(view, p_ws));
+    int face = glc_view_face(view, p_ws);
+    vec3 projected = glc_view_project_on(view, p_ws, face);
+    if (view.faces == 6) {   // a point on the very border of a face rounds into the tile beside it, which shows something else
+        vec2 tile_size = view.size / vec2(3.0, 2.0);
+        vec2 lower = vec2(face % 3, face / 3) * tile_size;
+        projected.xy = clamp(projected.xy, lower, lower + tile_size - 0.01);
+    }
+    return projected;
 }
 
 bool glc_view_inside(GlcView view, vec3 projected) {

@@ -19,7 +19,12 @@ const float GLC_CUTOFF = 7.0;           // squared Mahalanobis radius where the 
 vec3 difference(ivec2 texel, ivec2 step, vec4 here, float object, out bool valid) {
     ivec2 there = texel + step;
     valid = false;
-    if (any(lessThan(there, ivec2(0))) || any(greaterThanEqual(there, textureSize(t_landing, 0)))) return vec3(0.0);
+    ivec2 size = textureSize(t_landing, 0);
+    if (any(lessThan(there, ivec2(0))) || any(greaterThanEqual(there, size))) return vec3(0.0);
+#if CASTER_FACES == 6
+    ivec2 tile = size / ivec2(3, 2);
+    if (there / tile != texel / tile) return vec3(0.0);   // another face of the cube: no neighbour
+#endif
     vec4 landing = texelFetch(t_landing, there, 0);
     valid = landing.w > 0.0 && texelFetch(t_caster_position, there, 0).w == object;
     return valid ? landing.xyz - here.xyz : vec3(0.0);

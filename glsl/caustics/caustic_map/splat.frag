@@ -18,13 +18,18 @@ float kernel(vec2 x) {
 void main() {
     vec2 x = gl_FragCoord.xy - v_centre;
     float w = kernel(x);
-    // What would fall across the border of the map (or of a cube face) is mirrored back: no flux is lost, no seam darkens.
+#if RECEIVER_FACES == 6
+    // What falls across the border of a cube face belongs to the copy on the other one.
+    if (any(lessThan(gl_FragCoord.xy, v_tile.xy)) || any(greaterThanEqual(gl_FragCoord.xy, v_tile.zw))) discard;
+#else
+    // What would fall across the border of the map is mirrored back: no flux is lost, no rim darkens.
     vec2 mirrored = 2.0 * mix(v_tile.xy, v_tile.zw, step(0.5 * (v_tile.xy + v_tile.zw), v_centre)) - gl_FragCoord.xy - v_centre;
     vec2 to_border = min(v_centre - v_tile.xy, v_tile.zw - v_centre);
     if (min(to_border.x, to_border.y) < SPLAT_BORDER_REACH) {
         if (any(lessThan(gl_FragCoord.xy, v_tile.xy)) || any(greaterThanEqual(gl_FragCoord.xy, v_tile.zw))) discard;
         w += kernel(vec2(mirrored.x, x.y)) + kernel(vec2(x.x, mirrored.y)) + kernel(mirrored);
     }
+#endif
     if (w <= 0.0) discard;
     o_flux = vec4(v_flux * w, 0.0);
 }
