@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from glcaustics.passes.frame import FrameSetup, LightSetup
+from glcaustics.passes.frame import BELOW, BESIDE, FrameSetup, LightSetup
 from glcaustics.passes.geometry import TRANSMISSIVE_KINDS
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.scene.model import OpticalKind
@@ -18,30 +18,40 @@ STATUS_WORDS = {  # negative values in landing.w; see solve.frag
     -3: "unconverged",
     -4: "no_exit_found",
     -5: "absorbed",
+    -6: "normal_faces_away",
+    -7: "met_another_specular_surface",
+    -8: "left_the_scene",
 }
 CONVERGED, BRACKETED = 1, 2
 
 
+REFLECT, INTERFACE, SOLID = "reflect", "interface", "solid"
+BRANCH_CODE = {REFLECT: 0, INTERFACE: 1, SOLID: 2}  # solve.frag's BRANCH
+WORDS = {REFLECT: "reflected", INTERFACE: "refracted", SOLID: "twice refracted"}
+
+
 @dataclass(frozen=True)
 class Branch:
-    """Refracted or reflected light of one light source, of all colour channels or of one.
+    """Light of one source that takes one kind of path, of all colour channels or of one.
 
+    `kind`: REFLECT (mirrors, and what water and glass throw back), INTERFACE (through an open surface), SOLID (in and out again).
     `channels`: 1 for the colour channels carried; `channel`: the one whose index of refraction counts.
     """
 
     light_index: int
-    reflect: bool
+    kind: str
     channels: tuple[float, float, float] = (1.0, 1.0, 1.0)
     channel: int = 1
     suffix: str = ""
 
     @property
-    def kind(self) -> str:
-        return "reflect" if self.reflect else "refract"
+    def view(self) -> str:
+        """The receiver view that holds where it lands."""
+        return BELOW if self.kind == INTERFACE else BESIDE
 
     @property
     def words(self) -> str:
-        return "reflected" if self.reflect else f"refracted{self.suffix.replace('.', ' ')}"
+        return WORDS[self.kind] + self.suffix.replace(".", " ")
 
     def pass_name(self, stage: str) -> str:
         return f"caustic_map.{stage}.{self.kind}{self.suffix}@{self.light_index}"
@@ -71,15 +81,18 @@ def branches_of(setup: FrameSetup, light: LightSetup) -> list[Branch]:
     kinds = setup.kinds()
     transmissive = [i for i in setup.instances() if i.optical_kind in TRANSMISSIVE_KINDS]
     branches = []
-    if transmissive:
-        if setup.options["dispersion"] and any(i.material.dispersion > 0.0 for i in transmissive):
+    for kind, optical in ((INTERFACE, OpticalKind.INTERFACE), (SOLID, OpticalKind.SOLID)):
+        members = [i for i in transmissive if i.optical_kind is optical]
+        if not members:
+            continue
+        if setup.options["dispersion"] and any(i.material.dispersion > 0.0 for i in members):
             for channel, name in enumerate(("red", "green", "blue")):
                 mask = tuple(1.0 if c == channel else 0.0 for c in range(3))
-                branches.append(Branch(light.index, False, (mask[0], mask[1], mask[2]), channel, f".{name}"))
+                branches.append(Branch(light.index, kind, (mask[0], mask[1], mask[2]), channel, f".{name}"))
         else:
-            branches.append(Branch(light.index, False))
+            branches.append(Branch(light.index, kind))
     if OpticalKind.MIRROR in kinds or (transmissive and setup.options["reflect"]):
-        branches.append(Branch(light.index, True))
+        branches.append(Branch(light.index, REFLECT))
     return branches
 
 

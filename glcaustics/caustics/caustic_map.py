@@ -9,20 +9,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from glcaustics.caustics.branches import Branch, branches_of, solve_statistics
-from glcaustics.caustics.landing import fit_receiver
+from glcaustics.caustics.branches import BRANCH_CODE, REFLECT, SOLID, Branch, branches_of, solve_statistics
+from glcaustics.caustics.landing import fit_receivers
 from glcaustics.caustics.method import IRRADIANCE, CausticsMethod
 from glcaustics.errors import UsageError
 from glcaustics.gpu import Device
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes import light_view
-from glcaustics.passes.frame import FrameSetup, FrameState, LightSetup, PassContext
+from glcaustics.passes.frame import FrameSetup, FrameState, LightSetup, PassContext, ReceiverView
 from glcaustics.passes.light_views import light_uniforms
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.scene.model import OpticalKind
 
 SHADERS = "caustics/caustic_map"
 ESTIMATES = {"fixed_point": 0, "newton_fd": 1, "hybrid": 2}
+NEGLIGIBLE_SHARE = 5e-4  # a branch that brings less of a light's flux to the receivers is left out, and said so
 SPLAT_SIGMA = 0.62  # of the distance to the neighbour: least blur at which a regular grid of splats is flat to 0.2 %
 
 
@@ -92,20 +93,22 @@ class CausticMap(CausticsMethod):
     # -- declaration --------------------------------------------------------------------------------------------------
 
     def prepare(self, device: Device, setup: FrameSetup, frame: FrameState) -> None:
-        """Send a coarse light through the scene once, and fit each light's receiver view to where it lands."""
+        """Send a coarse light through the scene once, and fit each light's receiver views to where it lands."""
         for light in setup.lights:
             if light.caster is not None:
-                landed = fit_receiver(self, device, setup, light, frame)
-                self._keep_branches(setup, light, landed)
+                shares = fit_receivers(self, device, setup, light, frame)
+                self._keep_branches(setup, light, shares)
 
-    def _keep_branches(self, setup: FrameSetup, light: LightSetup, landed: Mapping[str, float]) -> None:
-        """Leave out the branches none of whose light lands."""
+    def _keep_branches(self, setup: FrameSetup, light: LightSetup, shares: Mapping[str, float]) -> None:
+        """Leave out the branches of which next to no light lands."""
         kept = []
         for branch in branches_of(setup, light):
-            if landed.get(branch.kind, 1.0) > 1e-5:
+            share = shares.get(branch.kind, 1.0)
+            if share > NEGLIGIBLE_SHARE:
                 kept.append(branch)
             else:
-                self._left_out.append((branch.pass_name("solve"), f"no {branch.words} light lands on a receiver"))
+                because = f"{100.0 * share:.2g} % of the light is {branch.words} and lands on a receiver"
+                self._left_out.append((branch.pass_name("solve"), because))
         self._branches[light.index] = kept
 
     def branches(self, setup: FrameSetup, light: LightSetup) -> list[Branch]:
@@ -119,42 +122,49 @@ class CausticMap(CausticsMethod):
         graph.leave_out("caustic_map.gather", because)
 
     def declare(self, graph: FrameGraph, setup: FrameSetup) -> None:
-        maps = []
+        maps: list[tuple[LightSetup, ReceiverView]] = []
         for light in setup.lights:
-            if light.caster is None or light.receiver is None or not self.branches(setup, light):
-                graph.leave_out(
-                    f"caustic_map{light.resource('')}", "its light reaches no specular surface, or none of it lands"
-                )
+            if light.caster is None or not self.branches(setup, light):
+                because = "its light reaches no specular surface, or none of it lands"
+                graph.leave_out(f"caustic_map{light.resource('')}", because)
                 continue
-            self.declare_solves(graph, setup, light)
-            maps.append(self._declare_splat(graph, setup, light))
+            self.declare_solves(graph, setup, light, self.branches(setup, light))
+            for receiver in self._views(setup, light):
+                self._declare_splat(graph, setup, light, receiver)
+                maps.append((light, receiver))
         for name, because in self._left_out:
             graph.leave_out(name, because)
-        lit = [light for light in setup.lights if light.resource("caustic_map.flux") in maps]
         graph.add(
             PassDecl(
                 "caustic_map.gather",
                 {IRRADIANCE: self.irradiance_desc(setup)},
-                lambda ctx: self._gather(ctx, lit),
+                lambda ctx: self._gather(ctx, maps),
                 reads=(
                     "gbuffer.depth_m",
                     "gbuffer.normal_ws",
-                    *maps,
-                    *(light.resource("receiver.position_ws") for light in lit),
+                    *(_map(light, receiver) for light, receiver in maps),
+                    *(light.resource(f"receiver.{receiver.name}.position_ws") for light, receiver in maps),
                 ),
                 note="look-up in the caustic maps at the camera's pixels",
             )
         )
 
-    def declare_solves(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup) -> None:
+    def _views(self, setup: FrameSetup, light: LightSetup) -> list[ReceiverView]:
+        """The receiver views in which some branch of this light lands."""
+        used = {branch.view for branch in self.branches(setup, light)}
+        return [receiver for name, receiver in light.receivers.items() if name in used]
+
+    def declare_solves(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, branches: list[Branch]) -> None:
         """Light views and landing points of one light; also what the coarse fit runs."""
         light_view.declare_caster(graph, setup, light)
-        light_view.declare_receiver(graph, setup, light)
+        for receiver in light.receivers.values():
+            if any(branch.view == receiver.name for branch in branches):
+                light_view.declare_receiver(graph, setup, light, receiver)
         if OpticalKind.SOLID in setup.kinds():
             light_view.declare_caster_back(graph, setup, light)
         else:
             graph.leave_out(f"caster_back{light.resource('')}", "nothing in the scene is a solid with two interfaces")
-        for branch in self.branches(setup, light):
+        for branch in branches:
             self._declare_solve(graph, setup, light, branch)
 
     def _declare_solve(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, branch: Branch) -> None:
@@ -166,11 +176,13 @@ class CausticMap(CausticsMethod):
                 branch.pass_name("solve"),
                 {branch.landing: TextureDesc("rgba32f", size, "m"), branch.flux: TextureDesc("rgba32f", size, "lm")},
                 lambda ctx: self._solve(ctx, light, branch),
-                reads=tuple(
-                    light.resource(n)
-                    for n in ("caster.position_ws", "caster.normal_ws", "receiver.position_ws", "receiver.normal_ws")
+                reads=(
+                    light.resource("caster.position_ws"),
+                    light.resource("caster.normal_ws"),
+                    light.resource(f"receiver.{branch.view}.position_ws"),
+                    light.resource(f"receiver.{branch.view}.normal_ws"),
+                    *(back if branch.kind == SOLID else ()),
                 ),
-                optional=back if not branch.reflect else (),
                 note=f"where {branch.words} light lands",
             )
         )
@@ -184,34 +196,32 @@ class CausticMap(CausticsMethod):
             )
         )
 
-    def _declare_splat(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup) -> str:
-        assert light.receiver is not None
-        branches = self.branches(setup, light)
-        resource = light.resource("caustic_map.flux")
+    def _declare_splat(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, receiver: ReceiverView) -> None:
+        branches = [b for b in self.branches(setup, light) if b.view == receiver.name]
+        resource = _map(light, receiver)
         graph.add(
             PassDecl(
-                f"caustic_map.splat{light.resource('')}",
-                {resource: TextureDesc("rgba32f", light.receiver.size, "lm")},
-                lambda ctx: self._splat(ctx, light, branches, resource),
+                f"caustic_map.splat.{receiver.name}{light.resource('')}",
+                {resource: TextureDesc("rgba32f", receiver.view.size, "lm")},
+                lambda ctx: self._splat(ctx, light, receiver, branches),
                 reads=tuple(r for b in branches for r in (b.splat, b.conic, b.flux)),
                 note="the light added up in the caustic map",
             )
         )
-        return resource
 
     # -- execution ----------------------------------------------------------------------------------------------------
 
     def _solve(self, ctx: PassContext, light: LightSetup, branch: Branch) -> None:
-        assert light.caster is not None and light.receiver is not None
+        assert light.caster is not None
+        view = light.receivers[branch.view].view
         options = ctx.setup.options
-        back = ctx.has(light.resource("caster.back_position_ws"))
         program = ctx.device.program(
             f"{SHADERS}/solve",
             {
                 "CASTER_FACES": light.caster.faces,
-                "RECEIVER_FACES": light.receiver.faces,
-                "REFLECT": int(branch.reflect),
-                "HAS_BACK": int(back),
+                "RECEIVER_FACES": view.faces,
+                "BRANCH": BRANCH_CODE[branch.kind],
+                "HAS_MIRROR": int(branch.kind == REFLECT and OpticalKind.MIRROR in ctx.setup.kinds()),
                 "NAIVE_FLUX": int(options["naive_flux"]),
                 "ESTIMATE": ESTIMATES[options["estimate"]],
             },
@@ -219,17 +229,17 @@ class CausticMap(CausticsMethod):
         textures = {
             "t_caster_position": "caster.position_ws",
             "t_caster_normal": "caster.normal_ws",
-            "t_receiver_position": "receiver.position_ws",
-            "t_receiver_normal": "receiver.normal_ws",
+            "t_receiver_position": f"receiver.{branch.view}.position_ws",
+            "t_receiver_normal": f"receiver.{branch.view}.normal_ws",
         }
-        if back:
+        if branch.kind == SOLID:
             textures |= {"t_back_position": "caster.back_position_ws", "t_back_normal": "caster.back_normal_ws"}
         low, high = ctx.setup.scene_bounds_ws
         program.set_all(
             {
                 **{name: ctx.texture(light.resource(r)) for name, r in textures.items()},
                 **light.caster.uniforms("caster"),
-                **light.receiver.uniforms("receiver"),
+                **view.uniforms("receiver"),
                 **light_uniforms(light.light),
                 "t_objects": ctx.frame.gpu.objects,
                 "u_bounds_min_ws": tuple(low),
@@ -252,29 +262,28 @@ class CausticMap(CausticsMethod):
         program.set_all({"u_inverse_texels": 1.0 / texels, "u_caster_area_m2": light.caster.texel_measure * texels})
 
     def _footprint(self, ctx: PassContext, light: LightSetup, branch: Branch) -> None:
-        assert light.caster is not None and light.receiver is not None
-        program = ctx.device.program(
-            f"{SHADERS}/footprint", {"RECEIVER_FACES": light.receiver.faces, "CASTER_FACES": light.caster.faces}
-        )
+        view = light.receivers[branch.view].view
+        defines = {"RECEIVER_FACES": view.faces, "CASTER_FACES": light.caster.faces}
+        program = ctx.device.program(f"{SHADERS}/footprint", defines)
         program.set_all(
             {
                 "t_landing": ctx.texture(branch.landing),
                 "t_caster_position": ctx.texture(light.resource("caster.position_ws")),
-                **light.receiver.uniforms("receiver"),
+                **view.uniforms("receiver"),
                 "u_sigma": SPLAT_SIGMA,
                 "u_max_radius": float(ctx.setup.options["max_radius"]),
             }
         )
         ctx.device.draw_fullscreen(program, ctx.target(branch.splat, branch.conic))
 
-    def _splat(self, ctx: PassContext, light: LightSetup, branches: list[Branch], resource: str) -> None:
-        assert light.caster is not None and light.receiver is not None
-        target = ctx.target(resource)
+    def _splat(self, ctx: PassContext, light: LightSetup, receiver: ReceiverView, branches: list[Branch]) -> None:
+        assert light.caster is not None
+        target = ctx.target(_map(light, receiver))
         target.clear(0.0, 0.0, 0.0, 0.0)
         width, height = light.caster.size
-        copies = 3 if light.receiver.faces == 6 else 1  # a splat can reach three faces of a cube
+        copies = 3 if receiver.view.faces == 6 else 1  # a splat can reach three faces of a cube
         for branch in branches:
-            program = ctx.device.program(f"{SHADERS}/splat", {"RECEIVER_FACES": light.receiver.faces})
+            program = ctx.device.program(f"{SHADERS}/splat", {"RECEIVER_FACES": receiver.view.faces})
             program.set_all(
                 {
                     "t_splat": ctx.texture(branch.splat),
@@ -282,25 +291,24 @@ class CausticMap(CausticsMethod):
                     "t_flux": ctx.texture(branch.flux),
                     "u_width": width,
                     "u_count": width * height,
-                    "u_map_size": (float(light.receiver.size[0]), float(light.receiver.size[1])),
+                    "u_map_size": (float(receiver.view.size[0]), float(receiver.view.size[1])),
                 }
             )
             ctx.device.draw_points(program, target, copies * width * height, blend="add")
 
-    def _gather(self, ctx: PassContext, lit: list[LightSetup]) -> None:
+    def _gather(self, ctx: PassContext, maps: list[tuple[LightSetup, ReceiverView]]) -> None:
         target = ctx.target(IRRADIANCE)
         target.clear(0.0, 0.0, 0.0, 0.0)
-        for light in lit:
-            assert light.receiver is not None
-            program = ctx.device.program(f"{SHADERS}/gather", {"RECEIVER_FACES": light.receiver.faces})
+        for light, receiver in maps:
+            program = ctx.device.program(f"{SHADERS}/gather", {"RECEIVER_FACES": receiver.view.faces})
             program.set_all(
                 {
                     **ctx.frame.uniforms(),
-                    **light.receiver.uniforms("receiver"),
+                    **receiver.view.uniforms("receiver"),
                     "t_depth_m": ctx.texture("gbuffer.depth_m"),
                     "t_normal_ws": ctx.texture("gbuffer.normal_ws"),
-                    "t_receiver_position": ctx.texture(light.resource("receiver.position_ws")),
-                    "t_flux": ctx.texture(light.resource("caustic_map.flux")),
+                    "t_receiver_position": ctx.texture(light.resource(f"receiver.{receiver.name}.position_ws")),
+                    "t_flux": ctx.texture(_map(light, receiver)),
                     "u_max_taps": int(ctx.setup.options["gather_taps"]),
                 }
             )
@@ -313,3 +321,8 @@ class CausticMap(CausticsMethod):
 
     def solve_stats(self, runner: PlanRunner) -> list[dict[str, Any]]:
         return [solve_statistics(b, runner) for branches in self._branches.values() for b in branches]
+
+
+def _map(light: LightSetup, receiver: ReceiverView) -> str:
+    """The caustic map of one light and receiver view: flux per texel."""
+    return light.resource(f"caustic_map.{receiver.name}.flux")

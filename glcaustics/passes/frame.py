@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import moderngl
@@ -19,15 +19,38 @@ from glcaustics.scene.model import Camera, FloatArray, Instance, IntArray, Light
 SAMPLE_TIMES_S = (0.0, 1.3, 2.9, 5.3)  # where an animated water is looked at to bound its motion
 
 
+BESIDE, BELOW = (
+    "beside",
+    "below",
+)  # receiver views: from the light itself; along the refracted light under a water surface
+
+
+@dataclass(frozen=True, eq=False)
+class ReceiverView:
+    """The receivers as the light that lands on them sees them.
+
+    `view.light` may be a virtual light: under water the light comes along the refracted direction (directional), or from the
+    surface's image of the lamp (point, spot). Seen from the real light the deck would hide what it does reach.
+    `clip_plane`: (a, b, c, d); receivers where a x + b y + c z + d < 0 (above the water) are not drawn.
+    """
+
+    name: str
+    view: LightView
+    clip_plane: tuple[float, float, float, float] | None = None
+
+
 @dataclass(eq=False)
 class LightSetup:
-    """One light and its views; a view is None where the scene does not need it."""
+    """One light and its views; a view is None where the scene does not need it.
+
+    `receivers`: by name, BESIDE for reflected light and the light through solids, BELOW for the light through open surfaces.
+    """
 
     index: int
     light: Light
     shadow: LightView | None = None
     caster: LightView | None = None
-    receiver: LightView | None = None
+    receivers: dict[str, ReceiverView] = field(default_factory=dict)
     grounds: frozenset[int] = frozenset()  # identities of the instances that can throw no shadow
 
     def resource(self, name: str) -> str:
@@ -105,8 +128,7 @@ class FrameSetup:
         casters = [i for i in everything if i.optical_kind in SPECULAR_KINDS]
         if casters and self.has_receivers and "caster_size" in self.options:
             setup.caster = fit_view(light, points_of(casters), int(self.options["caster_size"]), depth_points_ws=points)
-            receivers = points_of([i for i in everything if i.optical_kind is OpticalKind.DIFFUSE])
-            setup.receiver = fit_view(light, receivers, int(self.options["map_size"]))
+            setup.receivers = receiver_views(everything, light, int(self.options["map_size"]))
         return setup
 
     def blocks_light(self, instance: Instance) -> bool:
@@ -159,6 +181,65 @@ def _unique_planes(normals: FloatArray, origins: FloatArray, *, flat: bool) -> l
     _, first = np.unique(np.round(normals, 5), axis=0, return_index=True)
     planes = [(normals[k], origins[k]) for k in first]
     return planes + [(-n, o) for n, o in planes] if flat else planes
+
+
+def receiver_views(everything: tuple[Instance, ...], light: Light, texels: int) -> dict[str, ReceiverView]:
+    """The receiver views that the scene's specular surfaces call for, fitted to all receivers."""
+    receivers = points_of([i for i in everything if i.optical_kind is OpticalKind.DIFFUSE])
+    interfaces = [i for i in everything if i.optical_kind is OpticalKind.INTERFACE]
+    views = {BESIDE: ReceiverView(BESIDE, fit_view(light, receivers, texels))}
+    if interfaces:
+        virtual, plane = light_below(interfaces, light)
+        under = receivers if plane is None else receivers[receivers @ np.asarray(plane[:3]) + plane[3] > 0.0]
+        if plane is not None and len(under) == 0:
+            under = receivers
+        views[BELOW] = ReceiverView(BELOW, fit_view(virtual, under, texels), plane)
+    return views
+
+
+def light_below(interfaces: list[Instance], light: Light) -> tuple[Light, tuple[float, float, float, float] | None]:
+    """The light as it comes through a nearly flat water surface, and the plane above which nothing receives it.
+
+    Directional: refracted at the mean normal. Point and spot: the paraxial image of the lamp, n times as high above the surface
+    (Hecht 2017, sec. 5.2). Surfaces that are not nearly one plane: the light itself, no plane.
+    """
+    points = points_of(interfaces)
+    normal = unit(sum((_mean_normal(i) for i in interfaces), np.zeros(3)) + 1e-12)
+    heights = points @ normal
+    low, high = float(heights.min()), float(heights.max())
+    if high - low > 0.25 * float(np.linalg.norm(np.ptp(points, axis=0))):
+        return light, None
+    ior = float(np.mean([i.material.ior for i in interfaces]))
+    if light.kind is LightKind.DIRECTIONAL:
+        d = unit(np.asarray(light.direction_ws, np.float64))
+        above = float(d @ normal) < 0.0
+    else:
+        above = float(np.asarray(light.position_ws) @ normal) > high
+        if not above and float(np.asarray(light.position_ws) @ normal) > low:
+            return light, None  # the lamp hangs among the waves
+    n, eta = (normal, ior) if above else (-normal, 1.0 / ior)
+    edge = high if above else -low
+    plane = (-float(n[0]), -float(n[1]), -float(n[2]), edge)
+    if light.kind is LightKind.DIRECTIONAL:
+        cos_i = max(-float(d @ n), 1e-3)
+        k = 1.0 - (1.0 - cos_i * cos_i) / (eta * eta)
+        if k <= 0.0:
+            return light, plane  # mean surface reflects totally; waves may still let some through
+        bent = d / eta + n * (cos_i / eta - np.sqrt(k))
+        return replace(light, direction_ws=(float(bent[0]), float(bent[1]), float(bent[2]))), plane
+    position = np.asarray(light.position_ws, np.float64)
+    height = float(position @ n) - edge
+    image = position + n * (height * (eta - 1.0))
+    # A spot's axis and cone bend too; a cone that is too wide costs texels, one that is too narrow would cost light.
+    virtual = replace(light, kind=LightKind.POINT, position_ws=(float(image[0]), float(image[1]), float(image[2])))
+    return virtual, plane
+
+
+def _mean_normal(instance: Instance) -> FloatArray:
+    """Area-weighted normal of an open surface, by its vertex normals' side, not of unit length."""
+    points, triangles = instance.positions_ws(), instance.mesh.triangles.astype(np.int64)
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    return np.asarray(np.cross(b - a, c - a).sum(axis=0))
 
 
 def _box(points: FloatArray) -> FloatArray:

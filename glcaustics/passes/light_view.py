@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext
+from glcaustics.passes.frame import BELOW, BESIDE, FrameSetup, LightSetup, PassContext, ReceiverView
 from glcaustics.passes.geometry import DrawItem
 from glcaustics.passes.light_views import LightView
 from glcaustics.scene.model import OpticalKind
@@ -35,7 +35,7 @@ def _draw_caster(ctx: PassContext, light: LightSetup, position: str, normal: str
     assert light.caster is not None
     target = ctx.target(position, normal, depth=depth)
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-    outputs = {**ctx.locations(POSITION=position, NORMAL=normal), "BACK": 0}
+    outputs = {**ctx.locations(POSITION=position, NORMAL=normal), "BACK": 0, "CLIP": 0}
     occluder = ctx.device.program(SHADER, {**outputs, "OCCLUDER": 1})
     shown = ctx.device.program(SHADER, {**outputs, "OCCLUDER": 0})
     gpu = ctx.frame.gpu
@@ -75,37 +75,45 @@ def _draw_back(ctx: PassContext, light: LightSetup, front: str, position: str, n
     assert light.caster is not None
     target = ctx.target(position, normal, depth=depth)
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-    program = ctx.device.program(SHADER, {**ctx.locations(POSITION=position, NORMAL=normal), "BACK": 1, "OCCLUDER": 0})
+    program = ctx.device.program(
+        SHADER, {**ctx.locations(POSITION=position, NORMAL=normal), "BACK": 1, "OCCLUDER": 0, "CLIP": 0}
+    )
     program.set(t_front_position=ctx.texture(front), u_light=light.caster.light_vec4)
     _draw_kind(ctx, light.caster, program, target, ctx.frame.gpu.select(OpticalKind.SOLID), cull="front")
 
 
-def declare_receiver(graph: FrameGraph, setup: FrameSetup, light: LightSetup) -> None:
+def declare_receiver(graph: FrameGraph, setup: FrameSetup, light: LightSetup, receiver: ReceiverView) -> None:
     """Position and normal of the first opaque surface, as if there were no specular ones."""
-    assert light.receiver is not None
-    size = light.receiver.size
-    position, normal, depth = (light.resource(f"receiver.{n}") for n in ("position_ws", "normal_ws", "depth"))
+    size = receiver.view.size
+    names = ("position_ws", "normal_ws", "depth")
+    position, normal, depth = (light.resource(f"receiver.{receiver.name}.{n}") for n in names)
     graph.add(
         PassDecl(
-            f"receiver_view{light.resource('')}",
+            f"receiver_view.{receiver.name}{light.resource('')}",
             {
                 position: TextureDesc("rgba32f", size, "m"),
                 normal: TextureDesc("rgba32f", size),
                 depth: TextureDesc("depth24", size),
             },
-            lambda ctx: _draw_receiver(ctx, light, position, normal, depth),
+            lambda ctx: _draw_receiver(ctx, receiver, position, normal, depth),
             always_writes=(depth,),
-            note="opaque surfaces seen from the light, where caustics can land",
+            note=f"opaque surfaces where caustics can land, seen from {RECEIVER_WORDS[receiver.name]}",
         )
     )
 
 
-def _draw_receiver(ctx: PassContext, light: LightSetup, position: str, normal: str, depth: str) -> None:
-    assert light.receiver is not None
+RECEIVER_WORDS = {BESIDE: "the light", BELOW: "the light as refracted"}
+
+
+def _draw_receiver(ctx: PassContext, receiver: ReceiverView, position: str, normal: str, depth: str) -> None:
     target = ctx.target(position, normal, depth=depth)
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-    program = ctx.device.program(SHADER, {**ctx.locations(POSITION=position, NORMAL=normal), "BACK": 0, "OCCLUDER": 0})
-    _draw_kind(ctx, light.receiver, program, target, ctx.frame.gpu.select(OpticalKind.DIFFUSE))
+    outputs = ctx.locations(POSITION=position, NORMAL=normal)
+    clip = receiver.clip_plane is not None
+    program = ctx.device.program(SHADER, {**outputs, "BACK": 0, "OCCLUDER": 0, "CLIP": int(clip)})
+    if receiver.clip_plane is not None:
+        program.set(u_clip_plane=receiver.clip_plane)
+    _draw_kind(ctx, receiver.view, program, target, ctx.frame.gpu.select(OpticalKind.DIFFUSE))
 
 
 def _draw_kind(ctx, view: LightView, program, target, items: list[DrawItem], cull: str | None = None) -> None:  # type: ignore[no-untyped-def]

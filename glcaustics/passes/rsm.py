@@ -22,7 +22,7 @@ def declare(graph: FrameGraph, setup: FrameSetup, light: LightSetup, *, with_spe
     """Resources `rsm.<attachment>@i`, or `rsm_specular.<attachment>@i` with specular surfaces too."""
     layer = "rsm_specular" if with_specular else "rsm"
     name = f"{layer}{light.resource('')}"
-    if light.receiver is None and light.shadow is None:
+    if not light.light.shines:
         graph.leave_out(name, "the light reaches nothing")
         return
     kinds = tuple(OpticalKind) if with_specular else (OpticalKind.DIFFUSE,)

@@ -37,8 +37,8 @@ def faces_of(scene: Scene, **arguments: object) -> tuple[int, int, int]:
     with glc.Renderer(scene, size=(16, 16), method="caustic_map", backend=BACKEND, **arguments) as renderer:
         _ = renderer.plan
         light = renderer._setup.lights[0]
-        assert light.caster and light.receiver and light.shadow
-        return light.caster.faces, light.receiver.faces, light.shadow.faces
+        assert light.caster and light.receivers and light.shadow
+        return light.caster.faces, max(r.view.faces for r in light.receivers.values()), light.shadow.faces
 
 
 def room(half_m: float = HALF, camera: Camera | None = None) -> Scene:

@@ -3,6 +3,11 @@
 // vertex grid in the vertex shader; a fragment solves the same and leaves it in a texture, which the splat and the statistics share.
 //
 // Flux of a texel: exact, E_perp x cross-section or I x solid angle (methods.md 1). NAIVE_FLUX 1 is their eq. 6, N.L / V, the baseline.
+// BRANCH: GLC_REFLECT, GLC_THROUGH (an open interface) or GLC_IN_AND_OUT (a solid's two).
+#define GLC_REFLECT 0
+#define GLC_THROUGH 1
+#define GLC_IN_AND_OUT 2
+
 #include "common/intersect.glsl"
 #include "common/intersect_box.glsl"
 #include "interface/caster_view.glsl"
@@ -14,7 +19,7 @@ uniform sampler2D t_caster_position;
 uniform sampler2D t_caster_normal;
 uniform sampler2D t_receiver_position;
 uniform sampler2D t_receiver_normal;
-#if HAS_BACK
+#if BRANCH == GLC_IN_AND_OUT
 uniform sampler2D t_back_position;
 uniform sampler2D t_back_normal;
 #endif
@@ -35,6 +40,8 @@ layout(location = 1) out vec4 o_flux;     // rgb: flux (carried, or lost when st
 #define GLC_TIR -1
 #define GLC_NO_EXIT -4
 #define GLC_DARK -5
+#define GLC_AVERTED -6
+#define GLC_SECOND_HIT -7
 
 vec3 texel_flux(GlcView view, vec3 p_ws, vec3 d, float n_dot_l) {
 #if NAIVE_FLUX
@@ -52,10 +59,10 @@ void main() {
     vec4 caster = texelFetch(t_caster_position, texel, 0);
     if (caster.w == 0.0) return;
     GlcObject object = glc_object(int(caster.w + 0.5) - 1);
-#if REFLECT
-    if (object.kind != GLC_MIRROR && u_channels != vec3(1.0)) return;
-#else
-    if (object.kind == GLC_MIRROR) return;
+#if BRANCH == GLC_THROUGH
+    if (object.kind != GLC_INTERFACE) return;
+#elif BRANCH == GLC_IN_AND_OUT
+    if (object.kind != GLC_SOLID) return;
 #endif
     GlcView caster_view = glc_caster_view();
     GlcView receiver_view = glc_receiver_view();
@@ -63,19 +70,20 @@ void main() {
     vec3 p = caster.xyz;
     vec3 d = glc_light_direction(caster_view, p);
 
-    // The side the light is on decides which medium it comes from; the shading normal may disagree near a silhouette.
+    // The side the light is on decides which medium it comes from.
     bool from_dense = object.kind == GLC_INTERFACE && stored_normal.w < 0.0;
     vec3 n = stored_normal.xyz * (stored_normal.w < 0.0 ? -1.0 : 1.0);
-    float n_dot_l = max(-dot(n, d), 0.0);
-    if (n_dot_l == 0.0) { n = glc_safe_normalize(n - d * (dot(n, d) + 1e-3), -d); n_dot_l = max(-dot(n, d), 1e-4); }
-    vec3 flux = texel_flux(caster_view, p, d, n_dot_l) * u_channels;
+    float n_dot_l = -dot(n, d);
+    vec3 flux = texel_flux(caster_view, p, d, max(n_dot_l, 0.0)) * u_channels;
+    // At a silhouette an interpolated normal can turn away from the light that its triangle sees: no interface to speak of.
+    if (n_dot_l <= 0.0) { o_landing.w = float(GLC_AVERTED); o_flux.rgb = flux; return; }
     float ior = object.ior[u_channel];
     float eta = from_dense ? 1.0 / ior : ior;
     if (from_dense && u_light.w != 0.0) flux *= glc_transmittance(object.sigma_a, length(p - u_light.xyz));
 
     vec3 ray = reflect(d, n);
     float iterations = 0.0;
-#if REFLECT
+#if BRANCH == GLC_REFLECT
     vec3 reflectance = object.kind == GLC_MIRROR ? glc_fresnel_metal(object.base_color, n_dot_l)
                                                  : vec3(glc_fresnel_dielectric(n_dot_l, eta));
     flux *= reflectance;
@@ -85,8 +93,8 @@ void main() {
     if (!glc_refract(d, n, eta, ray)) { o_landing.w = float(GLC_TIR); o_flux.rgb = flux; return; }
     flux *= transmitted_share;
     bool in_absorber = object.kind == GLC_INTERFACE && !from_dense;
-#if HAS_BACK
-    if (object.kind == GLC_SOLID) {
+#if BRANCH == GLC_IN_AND_OUT
+    {
         float t_max = glc_box_exit(p, ray, u_bounds_min_ws, u_bounds_max_ws);
         GlcHit exit = glc_intersect(t_back_position, t_back_normal, caster_view, p, ray, t_max, ESTIMATE, u_max_iterations,
                                     u_march_steps);
@@ -111,7 +119,7 @@ void main() {
     float t_max = glc_box_exit(p, ray, u_bounds_min_ws, u_bounds_max_ws);
     GlcHit hit = GlcHit(0.0, p, -ray, 0, GLC_MISSED);
     if (t_max > 0.0) {
-#if REFLECT
+#if BRANCH == GLC_REFLECT
         // A reflected ray leaves the light's direction altogether: the fixed point has no reason to contract there.
         if (ESTIMATE == GLC_HYBRID)
             hit = glc_intersect_march(t_receiver_position, t_receiver_normal, receiver_view, p, ray, t_max, u_march_steps);
@@ -120,6 +128,15 @@ void main() {
         hit = glc_intersect(t_receiver_position, t_receiver_normal, receiver_view, p, ray, t_max, ESTIMATE, u_max_iterations,
                             u_march_steps);
     }
+#if HAS_MIRROR
+    // Light that meets a second mirror on its way is another path (L S S D), which this map does not follow.
+    if (hit.status > 0 && object.kind == GLC_MIRROR) {
+        vec3 lifted = p + n * (2.0 * glc_texel_width(caster_view, p));
+        GlcHit second = glc_intersect_march(t_caster_position, t_caster_normal, caster_view, lifted, ray, hit.t, u_march_steps);
+        iterations += float(second.iterations);
+        if (second.status > 0) hit.status = GLC_SECOND_HIT;
+    }
+#endif
     if (in_absorber && hit.status > 0) flux *= glc_transmittance(object.sigma_a, hit.t);
     // The map stores the side that the light sees: what arrives at the other side of an opaque surface stays there.
     vec3 direct = glc_light_direction(receiver_view, hit.position_ws);

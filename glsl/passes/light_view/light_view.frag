@@ -1,6 +1,6 @@
 // Position and normal of the first surface seen from a light. position.w = object index + 1 (0: nothing there);
 // normal.w = +1 on the front of the triangle, -1 on its back. The normal is the mesh's own, not turned to the light.
-// OCCLUDER 1: opaque geometry in the way, stored as nothing. BACK 1: the first back face of the same object behind its front.
+// OCCLUDER 1: opaque geometry in the way, stored as nothing. CLIP 1: a half-space is cut away. BACK 1: the first back face of the same object behind its front.
 #include "common/optics.glsl"
 
 in vec3 v_position_ws;
@@ -14,6 +14,10 @@ uniform sampler2D t_front_position;
 uniform vec4 u_light;
 #endif
 
+#if CLIP
+uniform vec4 u_clip_plane;   // world space; what lies on its negative side is not drawn
+#endif
+
 #if HAS_POSITION
 layout(location = LOCATION_POSITION) out vec4 o_position_ws;
 #endif
@@ -22,6 +26,9 @@ layout(location = LOCATION_NORMAL) out vec4 o_normal_ws;
 #endif
 
 void main() {
+#if CLIP
+    if (dot(u_clip_plane, vec4(v_position_ws, 1.0)) < 0.0) discard;
+#endif
 #if OCCLUDER
     vec4 position = vec4(0.0), normal = vec4(0.0);
 #else
