@@ -1,4 +1,4 @@
-"""Small scenes and helpers of the feature tests: planes, boxes and sheets built in code, and one call to render them."""
+"""Small scenes and helpers of the feature tests: planes, boxes and sheets built in code, one call to render."""
 
 from __future__ import annotations
 

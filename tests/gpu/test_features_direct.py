@@ -110,7 +110,7 @@ def test_shadow_edge_is_in_its_place(kind: str, scale: float) -> None:
 @pytest.mark.parametrize("scale", [1.0, 0.001, 1000.0])
 @pytest.mark.parametrize("theta", [5.0, 45.0, 70.0, 85.0])
 def test_no_acne_on_a_lit_plane_and_ball(theta: float, scale: float) -> None:
-    """A tilted slab and a ball in sunlight: where the geometry faces the light and nothing is in the way, E is E cos."""
+    """A tilted slab and a ball in sunlight: E is E_perp cos wherever nothing is in the way."""
     ball = Instance("ball", icosphere("ball", 0.5, 24), WHITE, translation(-0.8, 0.6, 0.0))
     # the slab stands on its own, casts on nothing but itself
     slab = box("slab", (1.2, 0.1, 1.2), (0.9, 0.6, 0.0))
@@ -140,7 +140,8 @@ def test_no_light_leaks_under_a_box(kind: str, scale: float) -> None:
     """A box stands on the floor: right behind its base the floor is dark, as close as the picture resolves."""
     light = sun(45.0) if kind == "directional" else lamp((-3.0, 3.0, 0.0), 9.0)
     camera = Camera.look_at((3.0, 1.2, 0.0), (0.5, 0.0, 0.0), yfov_rad=math.radians(30.0))
-    scene = scaled(scene_of([plane("floor", 4.0), box("box", (1.0, 1.0, 1.0), (0.0, 0.5, 0.0))], [light], camera), scale)
+    instances = [plane("floor", 4.0), box("box", (1.0, 1.0, 1.0), (0.0, 0.5, 0.0))]
+    scene = scaled(scene_of(instances, [light], camera), scale)
     frame = shoot(scene, (256, 160), method="none", aovs=("direct_irradiance", "position_ws"))
     position = frame.aov["position_ws"].astype(np.float64) / scale
     value = frame.aov["direct_irradiance"][..., 1].astype(np.float64) / frame.aov["direct_irradiance"].max()

@@ -33,7 +33,7 @@ INTENSITY = 10.0
 
 
 def faces_of(scene: Scene, **arguments: object) -> tuple[int, int, int]:
-    """Faces of the caster's, the receiver's and the shadow's view of the first light, after the fit."""
+    """Most faces of the caster's, the receivers' and the shadow's views of the first light, after the fit."""
     with glc.Renderer(scene, size=(16, 16), method="caustic_map", backend=BACKEND, **arguments) as renderer:
         _ = renderer.plan
         light = renderer._setup.lights[0]
@@ -58,7 +58,7 @@ def room(half_m: float = HALF, camera: Camera | None = None) -> Scene:
 
 
 def truth_at(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Irradiance on the floor below the flat water, and where the light of the sheet's rim certainly does not matter."""
+    """Irradiance on the floor below the flat water, and where the sheet's rim does not matter."""
     radius = np.hypot(position[..., 0], position[..., 2])
     value = flat_point_irradiance(radius, height_m=HEIGHT, depth_m=DEPTH, ior=1.333, intensity=INTENSITY)
     return value, (np.abs(position[..., 1] + DEPTH) < 1e-3) & (radius < 1.6)
@@ -79,9 +79,12 @@ def test_cube_map_views_give_the_closed_form_without_seams(quality: str) -> None
     side = np.maximum(np.abs(position[..., 0]), np.abs(position[..., 2]))
     seam = region & (np.abs(side - 1.0) < 0.05)  # receiver: lamp is 1 m above the floor
     inner, outer = region & (side < 0.9), region & (side > 1.1)
-    print(f"{quality}: E/E_ref inner {ratio[inner].mean():.4f} (std {ratio[inner].std():.4f}), seam {ratio[seam].mean():.4f} "
-          f"(min {ratio[seam].min():.3f} max {ratio[seam].max():.3f}), outer {ratio[outer].mean():.4f} "
-          f"(std {ratio[outer].std():.4f}; min {ratio[outer].min():.3f} max {ratio[outer].max():.3f})")
+    for name, part in (("inner", inner), ("seam", seam), ("outer", outer)):
+        values = ratio[part]
+        print(
+            f"{quality} {name}: E/E_ref mean {values.mean():.4f}, std {values.std():.4f}, "
+            f"{values.min():.3f} to {values.max():.3f}"
+        )
     assert seam.sum() > 300 and outer.sum() > 1000
     for part in (inner, seam, outer):
         assert ratio[part].mean() == pytest.approx(1.0, abs=0.01)
@@ -90,9 +93,11 @@ def test_cube_map_views_give_the_closed_form_without_seams(quality: str) -> None
 
 
 def test_cube_and_single_frustum_agree_where_both_apply() -> None:
-    """The same lamp, water and floor; a second sheet high above turns the frustum into cubes and reaches the floor not."""
+    """The same lamp, water and floor; a second sheet high above turns the frusta into cubes."""
     small = scene_of(
-        [plane("floor", 1.6, -DEPTH), sheet("water", 0.7, 0.0)], [lamp((0.0, HEIGHT, 0.0), INTENSITY)], from_above(1.2, -DEPTH)
+        [plane("floor", 1.6, -DEPTH), sheet("water", 0.7, 0.0)],
+        [lamp((0.0, HEIGHT, 0.0), INTENSITY)],
+        from_above(1.2, -DEPTH),
     )
     assert faces_of(small)[0] == 1
     other = room(0.7)
@@ -137,7 +142,7 @@ def spot(inner_deg: float, outer_deg: float, position: tuple[float, float, float
 
 @pytest.mark.parametrize("cone", [(0.0, 20.0), (15.0, 25.0), (20.0, 20.5)])
 def test_spot_light_through_water(cone: tuple[float, float]) -> None:
-    """Flux: integral over the cone of I f(angle)^2 T 2 pi sin; the pattern: flat-water point light times the fall-off."""
+    """Flux: the integral over the cone of I f(angle)^2 T 2 pi sin; outside of the cone's image: darkness."""
     light = spot(*cone)
     pixels, half = 160, 1.2
     scene = scene_of([plane("floor", 2.0, -1.0), sheet("water", 1.5, 0.0)], [light], from_above(half, -1.0))
