@@ -14,14 +14,14 @@ from glcaustics.scene.model import OpticalKind
 
 STATUS_WORDS = {  # negative values in landing.w; see solve.frag
     -1: "total_internal_reflection",
-    -2: "missed_all_receivers",
+    -2: "hidden_from_the_light",
     -3: "unconverged",
     -4: "no_exit_found",
     -5: "absorbed",
     -6: "normal_faces_away",
     -7: "met_another_specular_surface",
-    -8: "left_the_scene",
 }
+LEFT = -8  # out of the scene: not lost, there is nothing to land on
 CONVERGED, BRACKETED = 1, 2
 
 
@@ -106,17 +106,20 @@ def solve_statistics(branch: Branch, runner: PlanRunner) -> dict[str, Any]:
     landed = status > 0
     total = float(lumens[tried].sum())
     lost = {word: float(lumens[status == code].sum()) for code, word in STATUS_WORDS.items() if (status == code).any()}
+    left = status == LEFT
     iterations = flux[..., 3][tried]
     return {
         "solve": branch.pass_name("solve"),
         "rays": int(tried.sum()),
         "converged": int((status == CONVERGED).sum()),
         "bracketed": int((status == BRACKETED).sum()),
-        "failed": int((tried & ~landed).sum()),
+        "left_the_scene": int(left.sum()),
+        "failed": int((tried & ~landed & ~left).sum()),
         "lookups_mean": float(iterations.mean()) if iterations.size else 0.0,
         "lookups_max": int(iterations.max()) if iterations.size else 0,
         "flux": total,
         "flux_landed": float(lumens[landed].sum()),
+        "flux_left_the_scene": float(lumens[left].sum()),
         "flux_lost": float(sum(lost.values())),
         "flux_lost_by_cause": lost,
         "flux_lost_share": float(sum(lost.values()) / total) if total > 0.0 else 0.0,

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+import numpy as np
+
 from glcaustics.caustics.branches import BRANCH_CODE, REFLECT, SOLID, Branch, branches_of, solve_statistics
 from glcaustics.caustics.landing import fit_receivers
 from glcaustics.caustics.method import IRRADIANCE, CausticsMethod
@@ -34,11 +36,11 @@ class CausticMap(CausticsMethod):
     summary = "light-space samples of water, glass and mirrors, splatted where their light lands"
     paper = "Shah, Konttinen, Pattanaik 2007: Caustics Mapping: An Image-space Technique for Real-time Caustics"
     ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        "draft": {"caster_size": 96, "map_size": 192, "max_iterations": 6, "march_steps": 12, "gather_taps": 1},
-        "low": {"caster_size": 160, "map_size": 320, "max_iterations": 8, "march_steps": 16, "gather_taps": 1},
-        "medium": {"caster_size": 288, "map_size": 512, "max_iterations": 10, "march_steps": 24, "gather_taps": 2},
-        "high": {"caster_size": 768, "map_size": 1024, "max_iterations": 12, "march_steps": 48, "gather_taps": 4},
-        "reference": {"caster_size": 2048, "map_size": 2048, "max_iterations": 16, "march_steps": 96, "gather_taps": 6},
+        "draft": {"caster_size": 96, "map_size": 192, "max_iterations": 6, "march_steps": 12, "gather_taps": 1, "internal_bounces": 0},
+        "low": {"caster_size": 160, "map_size": 320, "max_iterations": 8, "march_steps": 16, "gather_taps": 1, "internal_bounces": 1},
+        "medium": {"caster_size": 288, "map_size": 512, "max_iterations": 10, "march_steps": 24, "gather_taps": 2, "internal_bounces": 2},
+        "high": {"caster_size": 768, "map_size": 1024, "max_iterations": 12, "march_steps": 48, "gather_taps": 4, "internal_bounces": 4},
+        "reference": {"caster_size": 2048, "map_size": 2048, "max_iterations": 16, "march_steps": 96, "gather_taps": 6, "internal_bounces": 8},
     }
     option_help: ClassVar[Mapping[str, str]] = {
         "caster_size": "the casters' light view has about this^2 texels, one light sample each (8..8192)",
@@ -49,6 +51,7 @@ class CausticMap(CausticsMethod):
         "reflect": "follow reflected light too (true, false)",
         "dispersion": "refract red, green and blue apart where a material disperses (true, false)",
         "naive_flux": "the paper's N.L / V flux instead of the exact one, as a baseline (true, false)",
+        "internal_bounces": "total reflections followed inside a solid (0..32)",
         "gather_taps": "of the look-up on each side of a pixel that covers several texels (1..16)",
         "max_radius": "largest splat, texels of the map (2..64)",
     }
@@ -71,7 +74,7 @@ class CausticMap(CausticsMethod):
             "map_size": (8, 8192),
             "max_iterations": (1, 64),
             "march_steps": (0, 512),
-            "gather_taps": (1, 16),
+            "gather_taps": (1, 16), "internal_bounces": (0, 32),
             "max_radius": (2, 64),
         }
         for name, (low, high) in ranges.items():
@@ -191,7 +194,7 @@ class CausticMap(CausticsMethod):
                 branch.pass_name("footprint"),
                 {branch.splat: TextureDesc("rgba32f", size, "texel"), branch.conic: TextureDesc("rgba32f", size)},
                 lambda ctx: self._footprint(ctx, light, branch),
-                reads=(branch.landing, light.resource("caster.position_ws")),
+                reads=(branch.landing, light.resource("caster.position_ws"), light.resource("caster.normal_ws")),
                 note="how far it is spread there",
             )
         )
@@ -234,6 +237,14 @@ class CausticMap(CausticsMethod):
         }
         if branch.kind == SOLID:
             textures |= {"t_back_position": "caster.back_position_ws", "t_back_normal": "caster.back_normal_ws"}
+            solids = [item.bounds_ws for item in ctx.frame.gpu.select(OpticalKind.SOLID)]
+            program.set_all(
+                {
+                    "u_caster_min_ws": tuple(np.min([b[0] for b in solids], axis=0)),
+                    "u_caster_max_ws": tuple(np.max([b[1] for b in solids], axis=0)),
+                    "u_internal_bounces": int(options["internal_bounces"]),
+                }
+            )
         low, high = ctx.setup.scene_bounds_ws
         program.set_all(
             {
@@ -263,12 +274,15 @@ class CausticMap(CausticsMethod):
 
     def _footprint(self, ctx: PassContext, light: LightSetup, branch: Branch) -> None:
         view = light.receivers[branch.view].view
-        defines = {"RECEIVER_FACES": view.faces, "CASTER_FACES": light.caster.faces}
+        assert light.caster is not None
+        turn = 2.0 if branch.kind == REFLECT else 0.5
+        defines = {"RECEIVER_FACES": view.faces, "CASTER_FACES": light.caster.faces, "TURN": turn}
         program = ctx.device.program(f"{SHADERS}/footprint", defines)
         program.set_all(
             {
                 "t_landing": ctx.texture(branch.landing),
                 "t_caster_position": ctx.texture(light.resource("caster.position_ws")),
+                "t_caster_normal": ctx.texture(light.resource("caster.normal_ws")),
                 **view.uniforms("receiver"),
                 "u_sigma": SPLAT_SIGMA,
                 "u_max_radius": float(ctx.setup.options["max_radius"]),

@@ -15,15 +15,16 @@
 
 #define GLC_CONVERGED 1
 #define GLC_BRACKETED 2
-#define GLC_MISSED -2
+#define GLC_HIDDEN -2        // the ray ends behind what the view shows
 #define GLC_UNCONVERGED -3
+#define GLC_LEFT -8          // the ray leaves the scene in front of all that the view shows
 
 struct GlcHit {
     float t;            // metres along the ray
     vec3 position_ws;
     vec3 normal_ws;     // at the texel, as stored
     int iterations;     // texel look-ups
-    int status;         // GLC_CONVERGED, GLC_BRACKETED, GLC_MISSED, GLC_UNCONVERGED
+    int status;         // GLC_CONVERGED, GLC_BRACKETED, GLC_HIDDEN, GLC_UNCONVERGED, GLC_LEFT
 };
 
 struct GlcProbe {
@@ -68,7 +69,7 @@ const float GLC_REACH = 1.5;  // texel widths: half a texel's diagonal, plus one
 // Bracketing march over (0, t_max]: finds the first crossing from in front of the surface to behind it that really is the
 // surface (a ray that passes behind an occluder crosses too, but does not settle).
 GlcHit glc_intersect_march(sampler2D t_position, sampler2D t_normal, GlcView view, vec3 o, vec3 d, float t_max, int steps) {
-    GlcHit hit = GlcHit(0.0, o, -d, 0, GLC_MISSED);
+    GlcHit hit = GlcHit(0.0, o, -d, 0, GLC_LEFT);
     float t_front = 0.0;
     bool in_front = true;
     for (int i = 1; i <= steps; ++i) {
@@ -89,6 +90,7 @@ GlcHit glc_intersect_march(sampler2D t_position, sampler2D t_normal, GlcView vie
         in_front = false;
         t_front = t;
     }
+    if (!in_front) hit.status = GLC_HIDDEN;
     return hit;
 }
 
@@ -135,7 +137,7 @@ GlcHit glc_intersect(sampler2D t_position, sampler2D t_normal, GlcView view, vec
     }
     if (estimate != GLC_HYBRID || march_steps == 0) {
         GlcProbe last = glc_probe(t_position, view, o + t * d, t_max);
-        if (!last.valid) hit.status = GLC_MISSED;
+        if (!last.valid) hit.status = GLC_LEFT;
         return hit;
     }
     GlcHit marched = glc_intersect_march(t_position, t_normal, view, o, d, t_max, march_steps);

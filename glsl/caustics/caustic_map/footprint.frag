@@ -6,6 +6,7 @@
 
 uniform sampler2D t_landing;
 uniform sampler2D t_caster_position;
+uniform sampler2D t_caster_normal;
 uniform float u_sigma;          // standard deviation of a splat in units of the distance to its neighbour
 uniform float u_max_radius;     // texels
 
@@ -14,6 +15,8 @@ layout(location = 1) out vec4 o_conic;  // xyz: inverse covariance (a, b, c); w:
 
 const float GLC_PIXEL_VARIANCE = 0.2;   // texels^2: the map's own filter
 const float GLC_CUTOFF = 7.0;           // squared Mahalanobis radius where the kernel ends; SPLAT_CUTOFF in splat.frag
+
+// TURN: how much a ray turns with the normal: 2 reflected, about a half refracted.
 
 // Difference of landing points to a neighbour, metres; valid = false across a silhouette, another object or a lost ray.
 vec3 difference(ivec2 texel, ivec2 step, vec4 here, float object, out bool valid) {
@@ -31,7 +34,7 @@ vec3 difference(ivec2 texel, ivec2 step, vec4 here, float object, out bool valid
 }
 
 // Mean covariance of the two one-sided differences along one grid axis; of two that differ by far, the longer one crosses an edge.
-vec3 axis_covariance(GlcView view, vec3 centre, int face, vec4 here, float object, ivec2 texel, ivec2 step) {
+vec3 axis_covariance(GlcView view, vec3 centre, int face, vec4 here, float object, ivec2 texel, ivec2 step, float alone) {
     bool ok_a, ok_b;
     vec3 a = difference(texel, step, here, object, ok_a);
     vec3 b = difference(texel, -step, here, object, ok_b);
@@ -43,7 +46,7 @@ vec3 axis_covariance(GlcView view, vec3 centre, int face, vec4 here, float objec
     vec2 ua = ok_a ? glc_view_project_on(view, here.xyz + a, face).xy - centre.xy : vec2(0.0);
     vec2 ub = ok_b ? glc_view_project_on(view, here.xyz + b, face).xy - centre.xy : vec2(0.0);
     float count = float(ok_a) + float(ok_b);
-    if (count == 0.0) return vec3(0.0);
+    if (count == 0.0) return vec3(alone, 0.0, alone);
     return (vec3(ua.x * ua.x, ua.x * ua.y, ua.y * ua.y) + vec3(ub.x * ub.x, ub.x * ub.y, ub.y * ub.y)) / count;
 }
 
@@ -53,12 +56,15 @@ void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
     vec4 here = texelFetch(t_landing, texel, 0);
     if (here.w <= 0.0) return;
-    float object = texelFetch(t_caster_position, texel, 0).w;
     GlcView view = glc_receiver_view();
     int face = glc_view_face(view, here.xyz);
     vec3 centre = glc_view_project_on(view, here.xyz, face);
-    vec3 c = axis_covariance(view, centre, face, here, object, texel, ivec2(1, 0))
-           + axis_covariance(view, centre, face, here, object, texel, ivec2(0, 1));
+    // A sliver one texel wide has no neighbour to measure against: its normal's change over the texel says how far it spreads.
+    vec4 caster = texelFetch(t_caster_position, texel, 0);
+    float bend = abs(texelFetch(t_caster_normal, texel, 0).w) - 1.0;
+    float spread = TURN * bend * length(here.xyz - caster.xyz) / max(glc_texel_width(view, here.xyz), 1e-30);
+    vec3 c = axis_covariance(view, centre, face, here, caster.w, texel, ivec2(1, 0), spread * spread)
+           + axis_covariance(view, centre, face, here, caster.w, texel, ivec2(0, 1), spread * spread);
     c = c * (u_sigma * u_sigma) + vec3(GLC_PIXEL_VARIANCE, 0.0, GLC_PIXEL_VARIANCE);
     float mean = 0.5 * (c.x + c.z);
     float largest = mean + sqrt(max(mean * mean - (c.x * c.z - c.y * c.y), 0.0));

@@ -1,5 +1,5 @@
 // Position and normal of the first surface seen from a light. position.w = object index + 1 (0: nothing there);
-// normal.w = +1 on the front of the triangle, -1 on its back. The normal is the mesh's own, not turned to the light.
+// normal.w: positive on the front of the triangle, negative on its back; |w| - 1 = change of the normal over one texel. The normal is the mesh's own, not turned to the light.
 // OCCLUDER 1: opaque geometry in the way, stored as nothing. CLIP 1: a half-space is cut away. BACK 1: the first back face of the same object behind its front.
 #include "common/optics.glsl"
 
@@ -33,7 +33,9 @@ void main() {
     vec4 position = vec4(0.0), normal = vec4(0.0);
 #else
     vec4 position = vec4(v_position_ws, u_object + 1.0);
-    vec4 normal = vec4(glc_safe_normalize(v_normal_ws, vec3(0.0)), gl_FrontFacing ? 1.0 : -1.0);
+    vec3 n = glc_safe_normalize(v_normal_ws, vec3(0.0));
+    float bend = min(max(length(dFdx(n)), length(dFdy(n))), 1.0);
+    vec4 normal = vec4(n, gl_FrontFacing ? 1.0 + bend : -1.0 - bend);
 #endif
 #if BACK
     vec4 front = texelFetch(t_front_position, ivec2(gl_FragCoord.xy), 0);
