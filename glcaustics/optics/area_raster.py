@@ -33,8 +33,9 @@ class AreaRaster:
             self._add_chunk(xy_px[start : start + EDGES_PER_CHUNK // 3], flux[start : start + EDGES_PER_CHUNK // 3])
 
     def _add_chunk(self, xy: FloatArray, flux: FloatArray) -> None:
-        near = (xy[:, :, 1].max(axis=1) > 0.0) & (xy[:, :, 1].min(axis=1) < self.height)
-        near &= (xy[:, :, 0].max(axis=1) > 0.0) & (xy[:, :, 0].min(axis=1) < self.width)
+        low = np.minimum(np.minimum(xy[:, 0], xy[:, 1]), xy[:, 2])
+        high = np.maximum(np.maximum(xy[:, 0], xy[:, 1]), xy[:, 2])
+        near = (high[:, 0] > 0.0) & (low[:, 0] < self.width) & (high[:, 1] > 0.0) & (low[:, 1] < self.height)
         xy, flux = xy[near], flux[near]
         a, b = xy[:, 1] - xy[:, 0], xy[:, 2] - xy[:, 0]
         signed = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

@@ -40,7 +40,7 @@ class BeamSettings:
     reflect: bool = True
     split_levels: int = 5
     bend_levels: int = 3
-    wide_px: float = 2.0
+    wide_px: float = 3.0
     bend_px: float = 0.02
     seed: int = 0
 
@@ -107,7 +107,7 @@ class _BranchTrace:
     def _settle(self, corners: _Corners, level: int, straight: npt.NDArray[np.bool_]) -> None:
         """Add up what can be added; split the rest. `straight`: known to land as flat as it should."""
         signature = corners.landings.signature
-        some = (signature >= 0).any(axis=1)
+        some = (signature[:, 0] >= 0) | (signature[:, 1] >= 0) | (signature[:, 2] >= 0)
         if not some.all():
             corners, straight, signature = corners.pick(some), straight[some], signature[some]
         if len(signature) == 0:
@@ -115,10 +115,12 @@ class _BranchTrace:
         land = corners.landings
         caught = self.receiver.catches(land.point_ws.reshape(-1, 3), land.normal_ws.reshape(-1, 3)).reshape(-1, 3)
         caught &= signature >= 0
-        turned = np.einsum("nki,nki->nk", land.normal_ws, np.roll(land.normal_ws, 1, axis=1)).min(axis=1) < MIN_COSINE
-        whole = (signature == signature[:, :1]).all(axis=1) & (caught == caught[:, :1]).all(axis=1) & ~turned
+        whole = np.ones(len(signature), bool)
+        for k in (1, 2):
+            whole &= (signature[:, 0] == signature[:, k]) & (caught[:, 0] == caught[:, k])
+            whole &= np.einsum("ij,ij->i", land.normal_ws[:, 0], land.normal_ws[:, k]) > MIN_COSINE
         wide = self.receiver.size_px(land.point_ws) > self.settings.wide_px
-        split = np.where(whole, wide & caught[:, 0] & ~straight, caught.any(axis=1))
+        split = np.where(whole, wide & caught[:, 0] & ~straight, caught[:, 0] | caught[:, 1] | caught[:, 2])
         split &= level < np.where(whole, self.settings.bend_levels, self.settings.split_levels)
         self._add(corners.pick(~split), whole[~split], caught[~split])
         if split.any():
@@ -128,13 +130,12 @@ class _BranchTrace:
         if len(whole) == 0:
             return
         land = corners.landings
-        flux = self.patch.flux(corners.uv)[:, None] * self.color
-        each = flux[:, None, :] / 3.0 * np.where((land.signature >= 0)[..., None], land.throughput, 0.0)
-        self.balance.landed += each.sum(axis=(0, 1))
-        self.balance.caught += np.where(caught[..., None], each, 0.0).sum(axis=(0, 1))
+        flux = self.patch.flux(corners.uv)[:, None] * (self.color / 3.0)
+        each = flux[:, None, :] * land.throughput  # zero where nothing landed
+        self.balance.landed += np.einsum("nkc->c", each)
+        self.balance.caught += np.einsum("nkc,nk->c", each, caught.astype(np.float64))
         full = whole & caught[:, 0]
-        normal = land.normal_ws[full].mean(axis=1)
-        self.receiver.add_triangles(land.point_ws[full], normal, each[full].sum(axis=1))
+        self.receiver.add_triangles(land.point_ws[full], land.normal_ws[full, 0], np.einsum("nkc->nc", each[full]))
         single = caught & ~whole[:, None]
         self.balance.unsplit += each[single].sum(axis=0)
         self.receiver.add_points(land.point_ws[single], land.normal_ws[single], each[single])
