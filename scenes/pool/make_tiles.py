@@ -2,7 +2,7 @@
 
     python scenes/pool/make_tiles.py
 
-All of them repeat without a seam. Colours are chosen in linear RGB and stored as sRGB.
+All of them repeat without a seam. Colours are sRGB, chosen as they are stored.
 """
 
 from __future__ import annotations
@@ -15,15 +15,9 @@ from PIL import Image
 HERE = Path(__file__).parent
 
 
-def srgb(linear):
-    """Linear RGB to sRGB (IEC 61966-2-1)."""
-    linear = np.clip(linear, 0.0, 1.0)
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-
-
-def save(name, linear, colors=0):
-    """Write linear (H, W, 3) as an sRGB PNG, with a palette of `colors` when given (small files)."""
-    picture = Image.fromarray((srgb(linear) * 255.0 + 0.5).astype(np.uint8))
+def save(name, color, colors=0):
+    """Write sRGB values in [0, 1], (H, W, 3), as a PNG, with a palette of `colors` when given (small files)."""
+    picture = Image.fromarray((np.clip(color, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8))
     if colors:
         picture = picture.quantize(colors, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     picture.save(HERE / name, optimize=True)

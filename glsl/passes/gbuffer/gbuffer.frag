@@ -29,7 +29,7 @@ uniform sampler2D t_front_depth_m;
 uniform sampler2D t_front_normal;
 #endif
 #if HAS_BASE_COLOR_MAP
-uniform sampler2D t_base_color;
+uniform sampler2D t_base_color;   // sRGB images are decoded by the texture unit, before filtering
 #endif
 #if HAS_METALLIC_ROUGHNESS_MAP
 uniform sampler2D t_metallic_roughness;
@@ -57,10 +57,6 @@ layout(location = LOCATION_EMISSIVE) out vec4 o_emissive;      // radiance, cd/m
 layout(location = LOCATION_MOTION) out vec2 o_motion;          // uv now - uv in the last frame
 #endif
 
-vec3 linear_from_srgb(vec3 c) {
-    return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(vec3(0.04045), c));
-}
-
 void main() {
 #if LAYER_SPECULAR
     float opaque_m = texelFetch(t_opaque_depth_m, ivec2(gl_FragCoord.xy), 0).r;
@@ -84,7 +80,7 @@ void main() {
     float metallic = texelFetch(t_objects, ivec2(3, int(u_object)), 0).w;
     vec3 albedo = t0.rgb;
 #if HAS_BASE_COLOR_MAP
-    albedo *= linear_from_srgb(texture(t_base_color, v_uv).rgb);
+    albedo *= texture(t_base_color, v_uv).rgb;
 #endif
 #if HAS_METALLIC_ROUGHNESS_MAP
     vec4 mr = texture(t_metallic_roughness, v_uv);
@@ -101,7 +97,7 @@ void main() {
 #if HAS_EMISSIVE
     vec3 emissive = texelFetch(t_objects, ivec2(3, int(u_object)), 0).rgb;
 #if HAS_EMISSIVE_MAP
-    emissive *= linear_from_srgb(texture(t_emissive, v_uv).rgb);
+    emissive *= texture(t_emissive, v_uv).rgb;
 #endif
     o_emissive = vec4(emissive, 0.0);
 #endif

@@ -49,8 +49,7 @@ void main() {
     }
     vec3 albedo = object.kind == GLC_DIFFUSE ? object.base_color : vec3(1.0);
 #if HAS_UV
-    vec3 c = texture(t_base_color, v_uv).rgb;
-    if (object.kind == GLC_DIFFUSE) albedo *= mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(vec3(0.04045), c));
+    if (object.kind == GLC_DIFFUSE) albedo *= texture(t_base_color, v_uv).rgb;
 #endif
     o_flux = vec4(flux * albedo, 1.0);
 #endif
