@@ -106,6 +106,15 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     _write(Path(path), save)
 
 
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+    """Writes a file, whole or not at all. Raises UsageError when that is impossible."""
+
+    def save(part: Path) -> None:
+        part.write_bytes(data)
+
+    _write(Path(path), save)
+
+
 def _write(target: Path, save: Callable[[Path], None]) -> None:
     try:
         with _atomic(target) as part:

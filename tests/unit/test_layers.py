@@ -30,7 +30,8 @@ MAY_IMPORT = {
     "caustics": BASE | DATA | {"passes"},
     "output": BASE,
     "renderer": BASE | DATA | TECHNIQUES | {"output"},
-    "cli": BASE | DATA | TECHNIQUES | {"output", "renderer"},
+    "bench": BASE | DATA | TECHNIQUES | {"output", "renderer", "optics", "metrics"},
+    "cli": BASE | DATA | TECHNIQUES | {"output", "renderer", "bench"},
     "__init__": BASE | {"renderer", "scene"},
     "__main__": {"cli"},
 }

@@ -22,7 +22,7 @@ ROOT = Path(glcaustics.__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 CORE = {"moderngl", "glfw", "numpy", "pyrr", "trimesh", "pillow"}
 CORE_MODULES = {"moderngl", "glfw", "numpy", "pyrr", "trimesh", "PIL"}
-EXTRA_MODULES = {"OpenEXR", "imgui_bundle", "mitsuba", "flip_evaluator"}
+EXTRA_MODULES = {"OpenEXR", "imgui_bundle", "mitsuba", "flip_evaluator", "matplotlib", "embreex", "pyoidn"}
 
 
 def tracked(*folders: str) -> list[str]:
@@ -78,11 +78,12 @@ def test_core_dependencies_are_the_six() -> None:
 
 
 def test_pins_are_exact_and_meet_the_declared_bounds() -> None:
-    lines = (ROOT / "requirements.lock").read_text().splitlines()
+    names = ("requirements.lock", "requirements-bench.lock")
+    lines = [line for name in names for line in (ROOT / name).read_text().splitlines()]
     pins = dict(line.split("==") for line in lines if line and not line.startswith("#"))
     pinned = {canonicalize_name(name): version for name, version in pins.items()}
     extras = PROJECT["optional-dependencies"]
-    for line in [*PROJECT["dependencies"], *extras["exr"], *extras["dev"]]:
+    for line in [*PROJECT["dependencies"], *extras["exr"], *extras["bench"], *extras["dev"]]:
         requirement = Requirement(line)
         if requirement.name != "glcaustics":
             assert pinned[canonicalize_name(requirement.name)] in requirement.specifier, line

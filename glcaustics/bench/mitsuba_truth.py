@@ -1,0 +1,260 @@
+"""Irradiance by Mitsuba's `ptracer`: a pinhole over the receiver, E = pi L / albedo; and what an eye sees of it.
+
+The receivers get a tiny albedo, so that light that bounces from them a second time does not count (the share is the
+albedo itself); the direct light is taken off by a render of depth 2 with the same seed.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from glcaustics.bench.beam_export import beam_scene
+from glcaustics.bench.mitsuba_scene import aimed_light, best_variant, camera_sensor, film, look, mitsuba, shapes
+from glcaustics.bench.store import Store, digest, scene_key
+from glcaustics.bench.targets import Target, casters, luminance
+from glcaustics.errors import UsageError
+from glcaustics.optics.raycast import RayCaster
+from glcaustics.scene.model import Camera, LightKind, Scene
+
+FloatArray = npt.NDArray[np.float64]
+ALBEDO = 1e-3
+MITSUBA_VERSION = 3  # of the cache: raise it when this module's results change
+SAMPLES_PER_PASS = 256  # per pixel; more in one pass loses digits in the film's float32
+SEED_STRIDE = 1_000_003
+HALF_M = 20.0  # of the target as Mitsuba gets it: it starts rays 0.1 mm off surfaces, and more the farther out
+
+
+@dataclass(frozen=True, eq=False)
+class Halves:
+    """Two independent estimates of one image; the truth is their mean.
+
+    `first`, `second`: (H, W) float64 luminance of irradiance. `seconds`: what they took; 0 from a cache.
+    """
+
+    first: FloatArray
+    second: FloatArray
+    seconds: float = 0.0
+    source: str = ""
+
+    @property
+    def mean(self) -> FloatArray:
+        return 0.5 * (self.first + self.second)
+
+    @property
+    def noise(self) -> FloatArray:
+        """Root mean square error of `mean` by chance alone: half the difference of the halves; a scalar array."""
+        return np.sqrt(np.mean((0.5 * (self.first - self.second)) ** 2))
+
+
+class PhotonMap:
+    """A scene loaded once, whose irradiance at a target is then estimated with any number of photons.
+
+    Args:
+        scene: see `targets.bench_scene`.
+        pixels: of each side of the image.
+        variant: of Mitsuba; the fastest there is when None.
+
+    Raises:
+        UsageError: Mitsuba is missing, or the target's pinhole does not see all of it.
+    """
+
+    def __init__(self, scene: Scene, target: Target, pixels: int, variant: str | None = None) -> None:
+        check_pinhole(scene, target)
+        scene, target = enlarged(scene, target, HALF_M / target.half_m)
+        self.variant = variant or best_variant()
+        self._mi = mi = mitsuba(self.variant)
+        self._scenes = []
+        self._pixels, self._pinhole = pixels, Pinhole.over(target, pixels)
+        aim = np.concatenate([i.positions_ws() for i in casters(scene)])
+        everything = np.concatenate([i.positions_ws() for i in scene.instances_at(0.0)])
+        for light in scene.lights:
+            if not light.shines:
+                continue
+            parts = shapes(mi, scene, light, albedo=ALBEDO)
+            parts |= {"type": "scene", "light": aimed_light(mi, light, aim, everything)}
+            parts["sensor"] = self._pinhole.sensor(mi)
+            self._scenes.append(mi.load_dict(parts))
+        self._depth = target.interfaces + 2
+
+    def render(self, photons: int, seed: int, *, direct: bool = False) -> FloatArray:
+        """Caustic irradiance (H, W), luminance, by at least `photons` photons in passes averaged in float64.
+
+        Args:
+            direct: keep light that met no caster.
+        """
+        film_pixels = self._pinhole.side**2
+        spp, done = max(1, -(-photons // film_pixels)), 0
+        total = np.zeros((self._pixels, self._pixels))
+        while done < spp:
+            count = min(SAMPLES_PER_PASS, spp - done)
+            run = seed * SEED_STRIDE + done // SAMPLES_PER_PASS
+            image = self._pass(self._depth, count, run)
+            if not direct:
+                image = image - self._pass(2, count, run)
+            total += image * count
+            done += count
+        return total / spp
+
+    def _pass(self, depth: int, spp: int, seed: int) -> FloatArray:
+        mi = self._mi
+        settings = {"type": "ptracer", "max_depth": depth, "rr_depth": 1000, "hide_emitters": True}
+        integrator = mi.load_dict(settings)
+        images = [np.array(mi.render(s, integrator=integrator, spp=spp, seed=seed % 2**32)) for s in self._scenes]
+        radiance = np.sum(np.asarray(images, np.float64), axis=0)
+        flat = radiance[..., 0] if radiance.shape[-1] == 1 else luminance(radiance)
+        hole = self._pinhole
+        flat = flat[hole.row : hole.row + self._pixels, hole.column : hole.column + self._pixels]
+        return np.asarray(flat * (math.pi / ALBEDO))
+
+
+def enlarged(scene: Scene, target: Target, factor: float) -> tuple[Scene, Target]:
+    """The same at another scale, about the target's centre as the origin; irradiance stays what it is."""
+    move = np.eye(4)
+    move[:3, :3] *= factor
+    move[:3, 3] = -factor * np.asarray(target.centre_ws)
+    instances = tuple(replace(i, world_from_object=move @ i.world_from_object) for i in scene.instances_at(0.0))
+
+    def moved(point: tuple[float, float, float]) -> tuple[float, float, float]:
+        x, y, z = (move @ [*point, 1.0])[:3].tolist()
+        return x, y, z
+
+    lights = tuple(
+        light
+        if light.kind is LightKind.DIRECTIONAL
+        else replace(light, position_ws=moved(light.position_ws), intensity=light.intensity * factor**2)
+        for light in scene.lights
+    )
+    return (
+        replace(scene, instances=instances, waters=(), lights=lights),
+        replace(
+            target,
+            centre_ws=moved(target.centre_ws),
+            half_m=factor * target.half_m,
+            pinhole_ws=moved(target.pinhole_ws),
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class Pinhole:
+    """A pinhole camera over the receiver, its image plane parallel to it, whose film has the target's pixels in it.
+
+    It stands over the middle of its film, since Mitsuba's `ptracer` is wrong for shifted principal points; the film
+    grows until it holds the target. `side`: film pixels; `row`, `column`: of the target's first pixel.
+    """
+
+    eye_ws: tuple[float, float, float]
+    height_m: float
+    half_film_m: float
+    side: int
+    row: int
+    column: int
+
+    @staticmethod
+    def over(target: Target, pixels: int) -> Pinhole:
+        """The pinhole moves by less than a pixel, so that film and target share their pixel edges."""
+        step = 2.0 * target.half_m / pixels
+        low = np.asarray(target.centre_ws) - target.half_m
+        to_x, to_z = (round((target.pinhole_ws[i] - low[i]) / step) for i in (0, 2))
+        half = max(abs(to_x), abs(to_z), abs(pixels - to_x), abs(pixels - to_z))
+        eye = (float(low[0] + to_x * step), target.pinhole_ws[1], float(low[2] + to_z * step))
+        return Pinhole(eye, eye[1] - target.centre_ws[1], half * step, 2 * half, half - to_z, half - to_x)
+
+    def sensor(self, mi: Any) -> dict[str, Any]:
+        """Mitsuba's camera."""
+        return {
+            "type": "perspective",
+            "fov": 2.0 * math.degrees(math.atan(self.half_film_m / self.height_m)),
+            "near_clip": 1e-3 * self.height_m,
+            "far_clip": 1e3 * self.height_m,
+            "to_world": look(mi, self.eye_ws, (0, -1, 0), (0, 0, -1)),
+            "film": film(mi, (self.side, self.side)),
+            "sampler": {"type": "independent"},
+        }
+
+
+def check_pinhole(scene: Scene, target: Target, rays_per_side: int = 32) -> None:
+    """Raises UsageError when something stands between the target and its pinhole, or the receiver is not there."""
+    x, z = target.edges_m(rays_per_side)
+    grid_x, grid_z = np.meshgrid(0.5 * (x[1:] + x[:-1]), 0.5 * (z[1:] + z[:-1]))
+    points = np.stack([grid_x.ravel(), np.full(grid_x.size, target.centre_ws[1]), grid_z.ravel()], axis=1)
+    eye = np.asarray(target.pinhole_ws, np.float64)
+    distance = np.linalg.norm(points - eye, axis=1)
+    caster = RayCaster(beam_scene(scene))
+    hit_m = caster.first_hits(np.tile(eye, (len(points), 1)), (points - eye) / distance[:, None]).t
+    wrong = np.abs(hit_m - distance) > 1e-4 * distance.max()
+    if wrong.any():
+        raise UsageError(
+            f"the pinhole {target.pinhole_ws} sees {1 - wrong.mean():.0%} of the target",
+            where=f"bench target {target.scene}",
+            remedy="move pinhole_ws to where no caster hides the receiver",
+        )
+
+
+def mitsuba_reference(
+    scene: Scene, target: Target, pixels: int, photons: int, store: Store, variant: str | None = None
+) -> Halves:
+    """Two halves of `photons` photons each, from the cache when the same was rendered before."""
+    variant = variant or best_variant()
+    key = digest("mitsuba", MITSUBA_VERSION, scene_key(scene), list(vars(target).values()), pixels, photons, variant)
+    source = f"Mitsuba ptracer ({variant}), 2 x {photons / 1e6:g} M photons"
+    if kept := store.load(key):
+        return Halves(kept[1]["first"], kept[1]["second"], 0.0, source)
+    start = time.perf_counter()
+    tracer = PhotonMap(scene, target, pixels, variant)
+    first, second = (tracer.render(photons, seed) for seed in (1001, 2002))
+    halves = Halves(first, second, time.perf_counter() - start, source)
+    store.save(key, {"source": source}, {"first": first, "second": second})
+    return halves
+
+
+def seen_radiance(
+    scene: Scene,
+    target: Target,
+    irradiance: FloatArray,
+    camera: Camera,
+    size: tuple[int, int],
+    *,
+    albedo: float,
+    spp: int,
+) -> FloatArray:
+    """Radiance (H, W) of the target's caustic as an eye sees it past water and glass: the second of two stages.
+
+    The irradiance map becomes the emission albedo / pi E of an area light on the receiver, which Mitsuba's `path`
+    follows through specular surfaces (light paths from a point or directional light through water to the eye,
+    "SDS", are beyond every integrator). Everything else is black.
+
+    Args:
+        irradiance: (P, P) at the target, row 0 at -z.
+    """
+    mi = mitsuba(best_variant())
+    light = scene.lights[0]
+    parts = shapes(mi, scene, light, albedo=0.0) | {"type": "scene", "sensor": camera_sensor(mi, camera, size)}
+    x, y, z = target.centre_ws
+    emission = np.ascontiguousarray((irradiance * (albedo / math.pi))[..., None], np.float32)
+    lift = 1e-4 * target.half_m
+    # `look` along +y with up +z: the rectangle's own x axis is then +x, its v grows with z; bitmaps put row 0 at v = 1
+    parts["caustic"] = {
+        "type": "rectangle",
+        "to_world": look(mi, (x, y + lift, z), (0, 1, 0), (0, 0, 1), (target.half_m, target.half_m, 1.0)),
+        "bsdf": {"type": "diffuse", "reflectance": 0.0},
+        "emitter": {
+            "type": "area",
+            "radiance": {
+                "type": "bitmap",
+                "bitmap": mi.Bitmap(np.ascontiguousarray(emission[::-1])),
+                "raw": True,
+                "filter_type": "nearest",
+                "wrap_mode": "clamp",
+            },
+        },
+    }
+    integrator = mi.load_dict({"type": "path", "max_depth": 8, "rr_depth": 1000})
+    image = np.array(mi.render(mi.load_dict(parts), integrator=integrator, spp=spp, seed=7), np.float64)
+    return np.asarray(image[..., 0] if image.shape[-1] == 1 else luminance(image))
