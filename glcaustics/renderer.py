@@ -181,7 +181,8 @@ def plan_frame(
         scene, size, resolve_options(chosen, quality, {}), transmissive_shadows=chosen is not None
     )
     declared = _declare(setup, chosen() if chosen else None, aovs, specular_view, method)
-    return declared.graph.compile(outputs=declared.outputs)
+    _, kept = declared.graph.compile(outputs=declared.outputs).kept()
+    return declared.graph.compile(outputs=tuple(dict.fromkeys((*declared.outputs, *kept))))
 
 
 def _named(scene: Scene, method: str) -> str:
@@ -244,6 +245,7 @@ class Renderer:
         self.device.timing_enabled = stats
         self.announcements = [*scene.announcements, *self.device.announcements]
         self._gpu = GpuScene(self.device)
+        self._time: float | None = None
         self._runner: PlanRunner | None = None
         self._declared: _Declared | None = None
         self._previous: tuple[CameraState, dict[str, Any]] | None = None
@@ -353,11 +355,15 @@ class Renderer:
         outputs = self._declared.outputs
         if self._setup.collect_stats and self._method is not None:
             outputs = tuple(dict.fromkeys((*outputs, *self._method.stats_resources())))
-        self._runner = PlanRunner(self.device, self._declared.graph.compile(outputs=outputs), self._setup)
+        _, kept = self._declared.graph.compile(outputs=outputs).kept()
+        plan = self._declared.graph.compile(outputs=tuple(dict.fromkeys((*outputs, *kept))))
+        self._runner = PlanRunner(self.device, plan, self._setup)
         return self._runner
 
     def _frame_state(self, time: float, jitter_px: tuple[float, float] = (0.0, 0.0)) -> FrameState:
-        self._gpu.update(self.scene.instances_at(time))
+        if time != self._time:
+            self._gpu.update(self.scene.instances_at(time))
+            self._time = time
         camera = CameraState.make(self.scene.view_at(time), self.size, self._setup.scene_bounds_ws, jitter_px)
         before, transforms = self._previous or (camera, {})
         return FrameState(time, camera, before, self._gpu, self._exposure(), transforms)
@@ -457,7 +463,13 @@ class Renderer:
             "timer": self.device.timer_kind,
             "frame_ms": frame_ms,
             "passes": [
-                {"name": s.name, "ms": timings.get(s.name), "bytes": written[s.name]} for s in runner.plan.steps
+                {
+                    "name": s.name,
+                    "ms": 0.0 if s.name in runner.skipped else timings.get(s.name),
+                    "bytes": written[s.name],
+                    "kept": s.name in runner.skipped,
+                }
+                for s in runner.plan.steps
             ],
             "left_out": [{"name": item.name, "because": item.because} for item in runner.plan.left_out],
             "bytes_allocated": runner.plan.bytes_allocated,

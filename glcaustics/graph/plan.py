@@ -86,6 +86,25 @@ class Plan:
                 return step.decl.writes[resource]
         raise GraphError(f"'{resource}' is not in the plan", remedy=f"live are: {', '.join(self.slots) or 'none'}")
 
+    def kept(self) -> tuple[frozenset[str], tuple[str, ...]]:
+        """What does not depend on the camera, and so can be kept from frame to frame while the scene stands still.
+
+        Returns:
+            Names of the steps that need not run again, and the resources that others read from them; these must be among the
+            outputs of `compile`, or another resource may take their texture.
+        """
+        moving: set[str] = set()
+        steps: list[str] = []
+        for step in self.steps:
+            if step.decl.view_dependent or step.decl.history or any(r in moving for r in step.readable):
+                moving.update(step.live_writes)
+            else:
+                steps.append(step.name)
+        still = frozenset(steps)
+        made = {r for step in self.steps if step.name in still for r in step.live_writes}
+        read = (r for step in self.steps if step.name not in still for r in step.readable if r in made)
+        return still, tuple(dict.fromkeys(read))
+
     def explain(self) -> str:
         """The plan as a table for people; see `glcaustics.graph.explain`."""
         from glcaustics.graph.explain import explain

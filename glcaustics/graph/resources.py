@@ -78,6 +78,8 @@ class PassDecl:
         reads: resources the pass cannot do without.
         optional: resources it reads if some pass of the graph writes them; that alone keeps the writer alive.
         always_writes: subset of `writes` that is allocated even if nobody reads it (a depth buffer for depth testing).
+        view_dependent: the camera enters, not through what it reads but by itself. All that follows from it is drawn in every
+            frame; the rest can be kept while the scene stands still.
         history: resources read as the previous frame left them; no ordering within this frame.
         note: one line for the reader of a plan.
     """
@@ -90,6 +92,7 @@ class PassDecl:
     always_writes: tuple[str, ...] = ()
     history: tuple[str, ...] = ()
     note: str = ""
+    view_dependent: bool = False
 
     def __post_init__(self) -> None:
         if not self.name:

@@ -28,7 +28,12 @@ def declare_opaque(graph: FrameGraph, setup: FrameSetup) -> None:
     }
     graph.add(
         PassDecl(
-            "gbuffer", writes, _draw_opaque, always_writes=("gbuffer.depth",), note="opaque surfaces seen by the eye"
+            "gbuffer",
+            writes,
+            _draw_opaque,
+            always_writes=("gbuffer.depth",),
+            note="opaque surfaces seen by the eye",
+            view_dependent=True,
         )
     )
 
@@ -55,6 +60,7 @@ def declare_specular(graph: FrameGraph, setup: FrameSetup) -> None:
             reads=("gbuffer.depth_m",),
             always_writes=("specular.depth",),
             note="water, glass and mirrors seen by the eye",
+            view_dependent=True,
         )
     )
 
@@ -87,6 +93,7 @@ def declare_back(graph: FrameGraph, setup: FrameSetup) -> None:
             reads=("specular.depth_m", "specular.normal_ws"),
             always_writes=("specular.back_depth",),
             note="back faces of solids seen by the eye",
+            view_dependent=True,
         )
     )
 

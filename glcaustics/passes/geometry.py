@@ -67,6 +67,12 @@ def bounds_ws(instance: Instance) -> FloatArray:
     return np.stack([positions.min(axis=0), positions.max(axis=0)])
 
 
+def _unchanged(item: DrawItem, instance: Instance) -> bool:
+    old = item.instance
+    same = old.mesh is instance.mesh and old.material is instance.material
+    return same and old.world_from_object is instance.world_from_object and old.name == instance.name
+
+
 class GpuScene:
     """Keeps the meshes of a scene on the GPU; meshes of equal identity are uploaded once, moving ones in place."""
 
@@ -77,9 +83,13 @@ class GpuScene:
         self._images: dict[int, moderngl.Texture] = {}
         self._kept_images: list[Image] = []
         self.objects: moderngl.Texture | None = None
+        self.version = 0  # counts the updates that changed something
 
     def update(self, instances: tuple[Instance, ...]) -> None:
         """Upload what is new. An instance of the same name and the same vertex count reuses its buffers."""
+        if len(instances) == len(self.items) and all(map(_unchanged, self.items, instances)):
+            return
+        self.version += 1
         old_by_name = {item.instance.name: item for item in self.items}
         wanted = {id(instance.mesh) for instance in instances}
         items = []

@@ -76,7 +76,6 @@ def declare_shade(graph: FrameGraph, setup: FrameSetup) -> None:
             reads=("gbuffer.depth_m", "gbuffer.normal_ws", "gbuffer.albedo", "lighting.irradiance"),
             optional=(
                 "caustics.irradiance",
-                "occlusion.visibility",
                 *(("lighting.highlight",) if has_highlights(setup) else ()),
                 *(("gbuffer.emissive",) if emits else ()),
             ),
@@ -90,7 +89,6 @@ def _execute_shade(ctx: PassContext) -> None:
         "HIGHLIGHT": ("t_highlight", "lighting.highlight"),
         "EMISSIVE": ("t_emissive", "gbuffer.emissive"),
         "CAUSTICS": ("t_caustics", "caustics.irradiance"),
-        "OCCLUSION": ("t_occlusion", "occlusion.visibility"),
     }
     program = ctx.device.program("passes/shade/shade", {f"HAS_{k}": int(ctx.has(r)) for k, (_, r) in optional.items()})
     textures = {name: ctx.texture(resource) for name, resource in optional.values() if ctx.has(resource)}

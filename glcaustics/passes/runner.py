@@ -22,13 +22,22 @@ class PlanRunner:
         self._slots = [self._allocate(desc, labels.get(i, "history")) for i, desc in enumerate(plan.slot_descs)]
         self._textures = {resource: self._slots[slot] for resource, slot in plan.slots.items()}
         self._framebuffers: dict[tuple[int, ...], moderngl.Framebuffer] = {}
+        steps, frontier = plan.kept()
+        self._still = steps if set(frontier) <= set(plan.outputs) else frozenset()
+        self._still_version: int | None = None
+        self.skipped: frozenset[str] = frozenset()
 
     def _allocate(self, desc: TextureDesc, label: str) -> moderngl.Texture:
         return self.device.texture(desc.size, desc.format, filter=desc.filter, compare=desc.compare, label=label)
 
     def run(self, frame: FrameState) -> None:
-        """Execute every step."""
+        """Execute every step; those that the camera does not enter only when the scene has moved since they last ran."""
+        same = self._still_version == frame.gpu.version
+        self.skipped = self._still if same else frozenset()
+        self._still_version = frame.gpu.version
         for step in self.plan.steps:
+            if step.name in self.skipped:
+                continue
             with self.device.timer(step.name):
                 step.decl.execute(PassContext(step, self.device, self.setup, frame, self._textures, self._framebuffers))
 

@@ -36,7 +36,7 @@ class FakeRenderer:
     def __exit__(self, *_: object) -> None:
         pass
 
-    def render(self, time: float) -> SimpleNamespace:
+    def render(self, time: float, samples: int = 1) -> SimpleNamespace:
         if len(self.times) == FakeRenderer.fail_at:
             raise DeviceError("the context was lost", where="lighting", remedy="try again")
         self.times.append(time)

@@ -16,9 +16,6 @@ uniform sampler2D t_emissive;
 #if HAS_CAUSTICS
 uniform sampler2D t_caustics;
 #endif
-#if HAS_OCCLUSION
-uniform sampler2D t_occlusion;
-#endif
 
 in vec2 v_uv;
 layout(location = 0) out vec4 o_radiance;
@@ -32,9 +29,6 @@ void main() {
     vec3 n = texelFetch(t_normal_ws, pixel, 0).xyz;
     vec4 albedo = texelFetch(t_albedo, pixel, 0);
     vec3 ambient = glc_sky_irradiance(n);
-#if HAS_OCCLUSION
-    ambient *= texelFetch(t_occlusion, pixel, 0).r;
-#endif
     vec3 irradiance = texelFetch(t_irradiance, pixel, 0).rgb + ambient;
 #if HAS_CAUSTICS
     irradiance += texelFetch(t_caustics, pixel, 0).rgb;
