@@ -171,7 +171,8 @@ def plan_frame(
     *,
     specular_view: bool = True,
 ) -> Plan:
-    """The frame's plan without any GPU. The receivers' light views are then fitted to the receivers, not yet to the landing light.
+    """The frame's plan without any GPU. The receivers' light views are then fitted to the receivers, not yet to the
+    landing light.
 
     Raises:
         UsageError: unknown method, quality or AOV.
@@ -286,8 +287,8 @@ class Renderer:
 
         Args:
             time: seconds; waters and camera paths move with it.
-            samples: pictures with the camera shifted by parts of a pixel, averaged (anti-aliasing). AOVs are those of the
-                first, unshifted one; `stats["frame_ms"]` is the median over the samples.
+            samples: pictures with the camera shifted by parts of a pixel, averaged (anti-aliasing). AOVs are those of
+                the first, unshifted one; `stats["frame_ms"]` is the median over the samples.
 
         Raises:
             UsageError: samples below 1.
@@ -299,7 +300,9 @@ class Renderer:
             return frame if samples == 1 else self._average(frame, time, samples)
 
     def _average(self, first: Frame, time: float, samples: int) -> Frame:
-        """The mean over shifted pictures; the 8-bit picture's is taken after tone mapping, so that highlights do not alias."""
+        """The mean over shifted pictures; the 8-bit picture's is taken after tone mapping, so that highlights do not
+        alias.
+        """
         image, ldr = first.image.astype(np.float64), first.ldr.astype(np.float64)
         times_ms = [first.stats["frame_ms"]]
         for index in range(1, samples):

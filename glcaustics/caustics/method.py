@@ -21,8 +21,8 @@ IRRADIANCE = "caustics.irradiance"  # what every method writes: E_c at the camer
 class CausticsMethod(ABC):
     """A way to compute the caustic irradiance E_c (methods.md 1) at the camera's opaque pixels.
 
-    A method adds its passes to the graph in `declare`; the last of them writes `caustics.irradiance`. One instance serves one
-    renderer, so it may keep what it measured in `prepare`.
+    A method adds its passes to the graph in `declare`; the last of them writes `caustics.irradiance`. One instance
+    serves one renderer, so it may keep what it measured in `prepare`.
 
     Attributes:
         name: as in `--method`. summary: one line. paper: author, year, title.
@@ -58,7 +58,7 @@ class CausticsMethod(ABC):
     def validate(cls, options: Mapping[str, Any]) -> None:
         """Raise UsageError for an option out of its range."""
 
-    def prepare(self, device: Device, setup: FrameSetup, frame: FrameState) -> None:
+    def prepare(self, device: Device, setup: FrameSetup, frame: FrameState) -> None:  # noqa: B027  may be nothing
         """Once, before the first frame: measure what the light views have to hold."""
 
     @abstractmethod

@@ -90,8 +90,8 @@ class Plan:
         """What does not depend on the camera, and so can be kept from frame to frame while the scene stands still.
 
         Returns:
-            Names of the steps that need not run again, and the resources that others read from them; these must be among the
-            outputs of `compile`, or another resource may take their texture.
+            Names of the steps that need not run again, and the resources that others read from them; these must be
+            among the outputs of `compile`, or another resource may take their texture.
         """
         moving: set[str] = set()
         steps: list[str] = []

@@ -78,8 +78,8 @@ class PassDecl:
         reads: resources the pass cannot do without.
         optional: resources it reads if some pass of the graph writes them; that alone keeps the writer alive.
         always_writes: subset of `writes` that is allocated even if nobody reads it (a depth buffer for depth testing).
-        view_dependent: the camera enters, not through what it reads but by itself. All that follows from it is drawn in every
-            frame; the rest can be kept while the scene stands still.
+        view_dependent: the camera enters, not through what it reads but by itself. All that follows from it is drawn
+            in every frame; the rest can be kept while the scene stands still.
         history: resources read as the previous frame left them; no ordering within this frame.
         note: one line for the reader of a plan.
     """

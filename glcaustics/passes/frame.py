@@ -29,8 +29,8 @@ BESIDE, BELOW = (
 class ReceiverView:
     """The receivers as the light that lands on them sees them.
 
-    `view.light` may be a virtual light: under water the light comes along the refracted direction (directional), or from the
-    surface's image of the lamp (point, spot). Seen from the real light the deck would hide what it does reach.
+    `view.light` may be a virtual light: under water the light comes along the refracted direction (directional), or
+    from the surface's image of the lamp (point, spot). Seen from the real light the deck would hide what it does reach.
     `clip_plane`: (a, b, c, d); receivers where a x + b y + c z + d < 0 (above the water) are not drawn.
     """
 
@@ -43,7 +43,8 @@ class ReceiverView:
 class LightSetup:
     """One light and its views; a view is None where the scene does not need it.
 
-    `receivers`: by name, BESIDE for reflected light and the light through solids, BELOW for the light through open surfaces.
+    `receivers`: by name, BESIDE for reflected light and the light through solids, BELOW for the light through open
+    surfaces.
     """
 
     index: int
@@ -62,8 +63,8 @@ class LightSetup:
 class FrameSetup:
     """What stays the same from frame to frame: the scene, the size, the options, the light views.
 
-    `shadow_size`: the shadow maps have about that^2 texels. `transmissive_shadows`: water and glass cut direct light, since a caustics
-    method brings what arrives. `bounds_ws`: (2, 3), the receivers' box.
+    `shadow_size`: the shadow maps have about that^2 texels. `transmissive_shadows`: water and glass cut direct light,
+    since a caustics method brings what arrives. `bounds_ws`: (2, 3), the receivers' box.
     """
 
     scene: Scene
@@ -200,8 +201,8 @@ def receiver_views(everything: tuple[Instance, ...], light: Light, texels: int) 
 def light_below(interfaces: list[Instance], light: Light) -> tuple[Light, tuple[float, float, float, float] | None]:
     """The light as it comes through a nearly flat water surface, and the plane above which nothing receives it.
 
-    Directional: refracted at the mean normal. Point and spot: the paraxial image of the lamp, n times as high above the surface
-    (Hecht 2017, sec. 5.2). Surfaces that are not nearly one plane: the light itself, no plane.
+    Directional: refracted at the mean normal. Point and spot: the paraxial image of the lamp, n times as
+    high above the surface (Hecht 2017, sec. 5.2). Surfaces that are not nearly one plane: the light itself, no plane.
     """
     points = points_of(interfaces)
     normal = unit(sum((_mean_normal(i) for i in interfaces), np.zeros(3)) + 1e-12)

@@ -1,4 +1,6 @@
-"""What a light sees: the casters (specular surfaces), their back faces, and the receivers (Shah et al. 2007, passes 1 and 2)."""
+"""What a light sees: the casters (specular surfaces), their back faces, and the receivers (Shah et al. 2007, passes 1
+and 2).
+"""
 
 from __future__ import annotations
 
@@ -116,7 +118,8 @@ def _draw_receiver(ctx: PassContext, receiver: ReceiverView, position: str, norm
     _draw_kind(ctx, receiver.view, program, target, ctx.frame.gpu.select(OpticalKind.DIFFUSE))
 
 
-def _draw_kind(ctx, view: LightView, program, target, items: list[DrawItem], cull: str | None = None) -> None:  # type: ignore[no-untyped-def]
+# type: ignore[no-untyped-def]
+def _draw_kind(ctx, view: LightView, program, target, items: list[DrawItem], cull: str | None = None) -> None:
     for matrix, viewport in zip(view.matrices, view.viewports(), strict=True):
         program.set(u_clip_from_world=matrix)
         ctx.frame.gpu.draw(program, target, items, viewport=viewport, cull=cull)

@@ -1,8 +1,8 @@
 """Views from a light, fitted to the points that matter: one frustum, or six faces of a cube in a 3x2 atlas.
 
-The GLSL side is `common/light_view.glsl`. A directional light gets an orthographic view, turned about the light's direction
-so that its rectangle is smallest; a point or spot light gets an off-centre perspective frustum, or a cube where one frustum
-cannot hold the points.
+The GLSL side is `common/light_view.glsl`. A directional light gets an orthographic view, turned about the light's
+direction so that its rectangle is smallest; a point or spot light gets an off-centre perspective frustum, or a cube
+where one frustum cannot hold the points.
 """
 
 from __future__ import annotations
@@ -26,8 +26,10 @@ CUBE_UP = np.array([[0, 1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1], [0, 1, 0], [0, 
 class LightView:
     """A fitted view. `size`: texels (width, height) of the texture, of the whole atlas for a cube.
 
-    `matrices`: clip-from-world, column-vector form, one a face. `texel_measure`: m^2 (directional) or the tangent-plane area of a
-    texel at unit distance. `near_m`, `far_m`: along the light's direction from the world's origin (directional), or from the light. `rect`: the window (x0, x1, y0, y1) along `right` and `up`: metres (directional) or tangents.
+    `matrices`: clip-from-world, column-vector form, one a face. `texel_measure`: m^2 (directional) or the tangent-plane
+    area of a texel at unit distance. `near_m`, `far_m`: along the light's direction from the world's origin
+    (directional), or from the light. `rect`: the window (x0, x1, y0, y1) along `right` and `up`: metres (directional)
+    or tangents.
     """
 
     light: Light
@@ -154,7 +156,9 @@ def light_axis(light: Light, points_ws: FloatArray) -> FloatArray:
 
 
 def depth_range(depths: FloatArray, extent_m: float, *, positional: bool) -> tuple[float, float]:
-    """Near and far plane with some air around the depths, in proportion to the scene's extent, so that scale does not matter."""
+    """Near and far plane with some air around the depths, in proportion to the scene's extent, so that scale does not
+    matter.
+    """
     lo, hi = float(np.min(depths)), float(np.max(depths))
     air = max(0.01 * (hi - lo), 1e-3 * extent_m, 1e-30)
     if positional:

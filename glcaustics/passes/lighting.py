@@ -66,7 +66,9 @@ def _draw_light(ctx: PassContext, light: LightSetup, target: Any, textures: dict
 
 
 def declare_shade(graph: FrameGraph, setup: FrameSetup) -> None:
-    """Radiance of the opaque layer: direct, caustic and sky light on its base colour, highlights, emission; the sky behind."""
+    """Radiance of the opaque layer: direct, caustic and sky light on its base colour, highlights, emission; the sky
+    behind.
+    """
     emits = any(any(c > 0.0 for c in i.material.emissive) for i in setup.instances())
     graph.add(
         PassDecl(

@@ -1,4 +1,6 @@
-"""Reflective shadow maps (Dachsbacher, Stamminger 2005): depth, normal, flux and roughness from a light, opaque alone or with specular."""
+"""Reflective shadow maps (Dachsbacher, Stamminger 2005): depth, normal, flux and roughness from a light, opaque alone
+or with specular.
+"""
 
 from __future__ import annotations
 

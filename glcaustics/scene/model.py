@@ -49,8 +49,9 @@ class Image:
 class Material:
     """glTF 2.0 metallic-roughness with the transmission, ior, volume, dispersion and emissive-strength extensions.
 
-    `emissive`: radiance, cd/m^2 (strength already multiplied in). `attenuation_distance_m`: distance at which white light
-    has become `attenuation_color`; `inf` = clear. `dispersion`: KHR_materials_dispersion, 20 / Abbe number; 0 = none.
+    `emissive`: radiance, cd/m^2 (strength already multiplied in). `attenuation_distance_m`: distance at which white
+    light has become `attenuation_color`; `inf` = clear. `dispersion`: KHR_materials_dispersion, 20 / Abbe number; 0 =
+    none.
     """
 
     name: str = "default"
