@@ -32,12 +32,13 @@ WORDS = {REFLECT: "reflected", INTERFACE: "refracted", SOLID: "twice refracted"}
 
 @dataclass(frozen=True)
 class Branch:
-    """Light of one source that takes one kind of path, of all colour channels or of one.
+    """Light of one source that takes one kind of path, of all colour channels or of one, as a method follows it.
 
     `kind`: REFLECT (mirrors, and what water and glass throw back), INTERFACE (through an open surface), SOLID (in and out again).
     `channels`: 1 for the colour channels carried; `channel`: the one whose index of refraction counts.
     """
 
+    method: str
     light_index: int
     kind: str
     channels: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -54,30 +55,31 @@ class Branch:
         return WORDS[self.kind] + self.suffix.replace(".", " ")
 
     def pass_name(self, stage: str) -> str:
-        return f"caustic_map.{stage}.{self.kind}{self.suffix}@{self.light_index}"
+        return f"{self.method}.{stage}.{self.kind}{self.suffix}@{self.light_index}"
 
-    def _resource(self, name: str) -> str:
-        return f"caustic_map.{self.kind}{self.suffix}.{name}@{self.light_index}"
+    def resource(self, name: str) -> str:
+        """A resource of this branch: "displaced_mesh.interface.cell@0"."""
+        return f"{self.method}.{self.kind}{self.suffix}.{name}@{self.light_index}"
 
     @property
     def landing(self) -> str:
-        return self._resource("landing_ws")
+        return self.resource("landing_ws")
 
     @property
     def flux(self) -> str:
-        return self._resource("flux")
+        return self.resource("flux")
 
     @property
     def splat(self) -> str:
-        return self._resource("splat")
+        return self.resource("splat")
 
     @property
     def conic(self) -> str:
-        return self._resource("conic")
+        return self.resource("conic")
 
 
-def branches_of(setup: FrameSetup, light: LightSetup) -> list[Branch]:
-    """What the scene's materials call for."""
+def branches_of(setup: FrameSetup, light: LightSetup, method: str) -> list[Branch]:
+    """What the scene's materials call for; `method`: the name of the method that follows them."""
     kinds = setup.kinds()
     transmissive = [i for i in setup.instances() if i.optical_kind in TRANSMISSIVE_KINDS]
     branches = []
@@ -88,11 +90,11 @@ def branches_of(setup: FrameSetup, light: LightSetup) -> list[Branch]:
         if setup.options["dispersion"] and any(i.material.dispersion > 0.0 for i in members):
             for channel, name in enumerate(("red", "green", "blue")):
                 mask = tuple(1.0 if c == channel else 0.0 for c in range(3))
-                branches.append(Branch(light.index, kind, (mask[0], mask[1], mask[2]), channel, f".{name}"))
+                branches.append(Branch(method, light.index, kind, (mask[0], mask[1], mask[2]), channel, f".{name}"))
         else:
-            branches.append(Branch(light.index, kind))
+            branches.append(Branch(method, light.index, kind))
     if OpticalKind.MIRROR in kinds or (transmissive and setup.options["reflect"]):
-        branches.append(Branch(light.index, REFLECT))
+        branches.append(Branch(method, light.index, REFLECT))
     return branches
 
 

@@ -9,199 +9,75 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-import numpy as np
-
-from glcaustics.caustics.branches import BRANCH_CODE, REFLECT, SOLID, Branch, branches_of, solve_statistics
-from glcaustics.caustics.landing import fit_receivers
-from glcaustics.caustics.method import IRRADIANCE, CausticsMethod
-from glcaustics.errors import UsageError
-from glcaustics.gpu import Device
+from glcaustics.caustics.branches import REFLECT, Branch
+from glcaustics.caustics.light_solve import SPLAT_SIGMA, LightMapMethod
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes import light_view
-from glcaustics.passes.frame import FrameSetup, FrameState, LightSetup, PassContext, ReceiverView
-from glcaustics.passes.light_views import light_uniforms
-from glcaustics.passes.runner import PlanRunner
-from glcaustics.scene.model import OpticalKind
+from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext, ReceiverView
 
 SHADERS = "caustics/caustic_map"
-ESTIMATES = {"fixed_point": 0, "newton_fd": 1, "hybrid": 2}
-NEGLIGIBLE_SHARE = 5e-4  # a branch that brings less of a light's flux to the receivers is left out, and said so
-SPLAT_SIGMA = 0.62  # of the distance to the neighbour: least blur at which a regular grid of splats is flat to 0.2 %
 
 
-class CausticMap(CausticsMethod):
+class CausticMap(LightMapMethod):
     """See the module."""
 
     name = "caustic_map"
     summary = "light-space samples of water, glass and mirrors, splatted where their light lands"
     paper = "Shah, Konttinen, Pattanaik 2007: Caustics Mapping: An Image-space Technique for Real-time Caustics"
     ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        "draft": {"caster_size": 96, "map_size": 192, "max_iterations": 6, "march_steps": 12, "gather_taps": 1, "internal_bounces": 0},
-        "low": {"caster_size": 160, "map_size": 320, "max_iterations": 8, "march_steps": 16, "gather_taps": 1, "internal_bounces": 1},
-        "medium": {"caster_size": 288, "map_size": 512, "max_iterations": 10, "march_steps": 24, "gather_taps": 2, "internal_bounces": 2},
-        "high": {"caster_size": 768, "map_size": 1024, "max_iterations": 12, "march_steps": 48, "gather_taps": 4, "internal_bounces": 4},
-        "reference": {"caster_size": 2048, "map_size": 2048, "max_iterations": 16, "march_steps": 96, "gather_taps": 6, "internal_bounces": 8},
+        "draft": {
+            "caster_size": 96,
+            "map_size": 192,
+            "max_iterations": 6,
+            "march_steps": 12,
+            "gather_taps": 1,
+            "internal_bounces": 0,
+        },
+        "low": {
+            "caster_size": 160,
+            "map_size": 320,
+            "max_iterations": 8,
+            "march_steps": 16,
+            "gather_taps": 1,
+            "internal_bounces": 1,
+        },
+        "medium": {
+            "caster_size": 288,
+            "map_size": 512,
+            "max_iterations": 10,
+            "march_steps": 24,
+            "gather_taps": 2,
+            "internal_bounces": 2,
+        },
+        "high": {
+            "caster_size": 768,
+            "map_size": 1024,
+            "max_iterations": 12,
+            "march_steps": 48,
+            "gather_taps": 4,
+            "internal_bounces": 4,
+        },
+        "reference": {
+            "caster_size": 2048,
+            "map_size": 2048,
+            "max_iterations": 16,
+            "march_steps": 96,
+            "gather_taps": 6,
+            "internal_bounces": 8,
+        },
     }
     option_help: ClassVar[Mapping[str, str]] = {
-        "caster_size": "the casters' light view has about this^2 texels, one light sample each (8..8192)",
-        "map_size": "the caustic map has about this^2 texels (8..8192)",
-        "estimate": "where a ray lands: fixed_point, newton_fd or hybrid",
-        "max_iterations": "of that estimate (1..64)",
-        "march_steps": "of the bracketing fallback and of reflected rays (0..512; 0 = off)",
-        "reflect": "follow reflected light too (true, false)",
-        "dispersion": "refract red, green and blue apart where a material disperses (true, false)",
+        **LightMapMethod.option_help,
         "naive_flux": "the paper's N.L / V flux instead of the exact one, as a baseline (true, false)",
-        "internal_bounces": "total reflections followed inside a solid (0..32)",
-        "gather_taps": "of the look-up on each side of a pixel that covers several texels (1..16)",
-        "max_radius": "largest splat, texels of the map (2..64)",
     }
-    defaults: ClassVar[Mapping[str, Any]] = {
-        "estimate": "hybrid",
-        "reflect": True,
-        "dispersion": True,
-        "naive_flux": False,
-        "max_radius": 48.0,
-    }
+    defaults: ClassVar[Mapping[str, Any]] = {**LightMapMethod.defaults, "naive_flux": False}
+    flags: ClassVar[tuple[str, ...]] = (*LightMapMethod.flags, "naive_flux")
 
-    def __init__(self) -> None:
-        self._branches: dict[int, list[Branch]] = {}
-        self._left_out: list[tuple[str, str]] = []
-
-    @classmethod
-    def validate(cls, options: Mapping[str, Any]) -> None:
-        ranges = {
-            "caster_size": (8, 8192),
-            "map_size": (8, 8192),
-            "max_iterations": (1, 64),
-            "march_steps": (0, 512),
-            "gather_taps": (1, 16), "internal_bounces": (0, 32),
-            "max_radius": (2, 64),
-        }
-        for name, (low, high) in ranges.items():
-            value = options[name]
-            if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-                raise UsageError(
-                    f"option {name} is {value!r}", where="caustic_map", remedy=f"give a number from {low} to {high}"
-                )
-        if options["estimate"] not in ESTIMATES:
-            raise UsageError(
-                f"option estimate is {options['estimate']!r}",
-                where="caustic_map",
-                remedy=f"use one of {', '.join(ESTIMATES)}",
-            )
-        for name in ("reflect", "dispersion", "naive_flux"):
-            if not isinstance(options[name], bool):
-                raise UsageError(f"option {name} is {options[name]!r}", where="caustic_map", remedy="use true or false")
-
-    # -- declaration --------------------------------------------------------------------------------------------------
-
-    def prepare(self, device: Device, setup: FrameSetup, frame: FrameState) -> None:
-        """Send a coarse light through the scene once, and fit each light's receiver views to where it lands."""
-        for light in setup.lights:
-            if light.caster is not None:
-                shares = fit_receivers(self, device, setup, light, frame)
-                self._keep_branches(setup, light, shares)
-
-    def _keep_branches(self, setup: FrameSetup, light: LightSetup, shares: Mapping[str, float]) -> None:
-        """Leave out the branches of which next to no light lands."""
-        kept = []
-        for branch in branches_of(setup, light):
-            share = shares.get(branch.kind, 1.0)
-            if share > NEGLIGIBLE_SHARE:
-                kept.append(branch)
-            else:
-                because = f"{100.0 * share:.2g} % of the light is {branch.words} and lands on a receiver"
-                self._left_out.append((branch.pass_name("solve"), because))
-        self._branches[light.index] = kept
-
-    def branches(self, setup: FrameSetup, light: LightSetup) -> list[Branch]:
-        """The branches that this light needs."""
-        return self._branches.get(light.index, branches_of(setup, light))
-
-    def leave_out(self, graph: FrameGraph, setup: FrameSetup, because: str) -> None:
-        for light in setup.lights:
-            for name in ("caster_view", "receiver_view", "caustic_map.solve", "caustic_map.splat"):
-                graph.leave_out(f"{name}{light.resource('')}", because)
-        graph.leave_out("caustic_map.gather", because)
-
-    def declare(self, graph: FrameGraph, setup: FrameSetup) -> None:
-        maps: list[tuple[LightSetup, ReceiverView]] = []
-        for light in setup.lights:
-            if light.caster is None or not self.branches(setup, light):
-                because = "its light reaches no specular surface, or none of it lands"
-                graph.leave_out(f"caustic_map{light.resource('')}", because)
-                continue
-            self.declare_solves(graph, setup, light, self.branches(setup, light))
-            for receiver in self._views(setup, light):
-                self._declare_splat(graph, setup, light, receiver)
-                maps.append((light, receiver))
-        for name, because in self._left_out:
-            graph.leave_out(name, because)
-        graph.add(
-            PassDecl(
-                "caustic_map.gather",
-                {IRRADIANCE: self.irradiance_desc(setup)},
-                lambda ctx: self._gather(ctx, maps),
-                reads=(
-                    "gbuffer.depth_m",
-                    "gbuffer.normal_ws",
-                    *(_map(light, receiver) for light, receiver in maps),
-                    *(light.resource(f"receiver.{receiver.name}.position_ws") for light, receiver in maps),
-                ),
-                note="look-up in the caustic maps at the camera's pixels",
-            )
-        )
-
-    def _views(self, setup: FrameSetup, light: LightSetup) -> list[ReceiverView]:
-        """The receiver views in which some branch of this light lands."""
-        used = {branch.view for branch in self.branches(setup, light)}
-        return [receiver for name, receiver in light.receivers.items() if name in used]
-
-    def declare_solves(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, branches: list[Branch]) -> None:
-        """Light views and landing points of one light; also what the coarse fit runs."""
-        light_view.declare_caster(graph, setup, light)
-        for receiver in light.receivers.values():
-            if any(branch.view == receiver.name for branch in branches):
-                light_view.declare_receiver(graph, setup, light, receiver)
-        if OpticalKind.SOLID in setup.kinds():
-            light_view.declare_caster_back(graph, setup, light)
-        else:
-            graph.leave_out(f"caster_back{light.resource('')}", "nothing in the scene is a solid with two interfaces")
+    def declare_map(
+        self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, receiver: ReceiverView, branches: list[Branch]
+    ) -> None:
         for branch in branches:
-            self._declare_solve(graph, setup, light, branch)
-
-    def _declare_solve(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, branch: Branch) -> None:
-        assert light.caster is not None
-        size = light.caster.size
-        back = (light.resource("caster.back_position_ws"), light.resource("caster.back_normal_ws"))
-        graph.add(
-            PassDecl(
-                branch.pass_name("solve"),
-                {branch.landing: TextureDesc("rgba32f", size, "m"), branch.flux: TextureDesc("rgba32f", size, "lm")},
-                lambda ctx: self._solve(ctx, light, branch),
-                reads=(
-                    light.resource("caster.position_ws"),
-                    light.resource("caster.normal_ws"),
-                    light.resource(f"receiver.{branch.view}.position_ws"),
-                    light.resource(f"receiver.{branch.view}.normal_ws"),
-                    *(back if branch.kind == SOLID else ()),
-                ),
-                note=f"where {branch.words} light lands",
-            )
-        )
-        graph.add(
-            PassDecl(
-                branch.pass_name("footprint"),
-                {branch.splat: TextureDesc("rgba32f", size, "texel"), branch.conic: TextureDesc("rgba32f", size)},
-                lambda ctx: self._footprint(ctx, light, branch),
-                reads=(branch.landing, light.resource("caster.position_ws"), light.resource("caster.normal_ws")),
-                note="how far it is spread there",
-            )
-        )
-
-    def _declare_splat(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, receiver: ReceiverView) -> None:
-        branches = [b for b in self.branches(setup, light) if b.view == receiver.name]
-        resource = _map(light, receiver)
+            self._declare_footprint(graph, light, branch)
+        resource = self.map_resource(light, receiver)
         graph.add(
             PassDecl(
                 f"caustic_map.splat.{receiver.name}{light.resource('')}",
@@ -212,65 +88,20 @@ class CausticMap(CausticsMethod):
             )
         )
 
-    # -- execution ----------------------------------------------------------------------------------------------------
-
-    def _solve(self, ctx: PassContext, light: LightSetup, branch: Branch) -> None:
+    def _declare_footprint(self, graph: FrameGraph, light: LightSetup, branch: Branch) -> None:
         assert light.caster is not None
-        view = light.receivers[branch.view].view
-        options = ctx.setup.options
-        program = ctx.device.program(
-            f"{SHADERS}/solve",
-            {
-                "CASTER_FACES": light.caster.faces,
-                "RECEIVER_FACES": view.faces,
-                "BRANCH": BRANCH_CODE[branch.kind],
-                "HAS_MIRROR": int(branch.kind == REFLECT and OpticalKind.MIRROR in ctx.setup.kinds()),
-                "NAIVE_FLUX": int(options["naive_flux"]),
-                "ESTIMATE": ESTIMATES[options["estimate"]],
-            },
-        )
-        textures = {
-            "t_caster_position": "caster.position_ws",
-            "t_caster_normal": "caster.normal_ws",
-            "t_receiver_position": f"receiver.{branch.view}.position_ws",
-            "t_receiver_normal": f"receiver.{branch.view}.normal_ws",
-        }
-        if branch.kind == SOLID:
-            textures |= {"t_back_position": "caster.back_position_ws", "t_back_normal": "caster.back_normal_ws"}
-            solids = [item.bounds_ws for item in ctx.frame.gpu.select(OpticalKind.SOLID)]
-            program.set_all(
-                {
-                    "u_caster_min_ws": tuple(np.min([b[0] for b in solids], axis=0)),
-                    "u_caster_max_ws": tuple(np.max([b[1] for b in solids], axis=0)),
-                    "u_internal_bounces": int(options["internal_bounces"]),
-                }
+        size = light.caster.size
+        graph.add(
+            PassDecl(
+                branch.pass_name("footprint"),
+                {branch.splat: TextureDesc("rgba32f", size, "texel"), branch.conic: TextureDesc("rgba32f", size)},
+                lambda ctx: self._footprint(ctx, light, branch),
+                reads=(branch.landing, light.resource("caster.position_ws"), light.resource("caster.normal_ws")),
+                note="how far it is spread there",
             )
-        low, high = ctx.setup.scene_bounds_ws
-        program.set_all(
-            {
-                **{name: ctx.texture(light.resource(r)) for name, r in textures.items()},
-                **light.caster.uniforms("caster"),
-                **view.uniforms("receiver"),
-                **light_uniforms(light.light),
-                "t_objects": ctx.frame.gpu.objects,
-                "u_bounds_min_ws": tuple(low),
-                "u_bounds_max_ws": tuple(high),
-                "u_channels": branch.channels,
-                "u_channel": branch.channel,
-                "u_max_iterations": int(options["max_iterations"]),
-                "u_march_steps": int(options["march_steps"]),
-            }
         )
-        if options["naive_flux"]:
-            self._set_naive(program, ctx, light)
-        ctx.device.draw_fullscreen(program, ctx.target(branch.landing, branch.flux))
 
-    @staticmethod
-    def _set_naive(program: Any, ctx: PassContext, light: LightSetup) -> None:
-        """Their eq. 6 divides by V, the covered texels, from an occlusion query; here the whole view stands for it."""
-        assert light.caster is not None
-        texels = light.caster.size[0] * light.caster.size[1]
-        program.set_all({"u_inverse_texels": 1.0 / texels, "u_caster_area_m2": light.caster.texel_measure * texels})
+    # -- execution ----------------------------------------------------------------------------------------------------
 
     def _footprint(self, ctx: PassContext, light: LightSetup, branch: Branch) -> None:
         view = light.receivers[branch.view].view
@@ -291,52 +122,7 @@ class CausticMap(CausticsMethod):
         ctx.device.draw_fullscreen(program, ctx.target(branch.splat, branch.conic))
 
     def _splat(self, ctx: PassContext, light: LightSetup, receiver: ReceiverView, branches: list[Branch]) -> None:
-        assert light.caster is not None
-        target = ctx.target(_map(light, receiver))
+        target = ctx.target(self.map_resource(light, receiver))
         target.clear(0.0, 0.0, 0.0, 0.0)
-        width, height = light.caster.size
-        copies = 3 if receiver.view.faces == 6 else 1  # a splat can reach three faces of a cube
         for branch in branches:
-            program = ctx.device.program(f"{SHADERS}/splat", {"RECEIVER_FACES": receiver.view.faces})
-            program.set_all(
-                {
-                    "t_splat": ctx.texture(branch.splat),
-                    "t_conic": ctx.texture(branch.conic),
-                    "t_flux": ctx.texture(branch.flux),
-                    "u_width": width,
-                    "u_count": width * height,
-                    "u_map_size": (float(receiver.view.size[0]), float(receiver.view.size[1])),
-                }
-            )
-            ctx.device.draw_points(program, target, copies * width * height, blend="add")
-
-    def _gather(self, ctx: PassContext, maps: list[tuple[LightSetup, ReceiverView]]) -> None:
-        target = ctx.target(IRRADIANCE)
-        target.clear(0.0, 0.0, 0.0, 0.0)
-        for light, receiver in maps:
-            program = ctx.device.program(f"{SHADERS}/gather", {"RECEIVER_FACES": receiver.view.faces})
-            program.set_all(
-                {
-                    **ctx.frame.uniforms(),
-                    **receiver.view.uniforms("receiver"),
-                    "t_depth_m": ctx.texture("gbuffer.depth_m"),
-                    "t_normal_ws": ctx.texture("gbuffer.normal_ws"),
-                    "t_receiver_position": ctx.texture(light.resource(f"receiver.{receiver.name}.position_ws")),
-                    "t_flux": ctx.texture(_map(light, receiver)),
-                    "u_max_taps": int(ctx.setup.options["gather_taps"]),
-                }
-            )
-            ctx.device.draw_fullscreen(program, target, blend="add")
-
-    # -- statistics ---------------------------------------------------------------------------------------------------
-
-    def stats_resources(self) -> tuple[str, ...]:
-        return tuple(r for branches in self._branches.values() for b in branches for r in (b.landing, b.flux))
-
-    def solve_stats(self, runner: PlanRunner) -> list[dict[str, Any]]:
-        return [solve_statistics(b, runner) for branches in self._branches.values() for b in branches]
-
-
-def _map(light: LightSetup, receiver: ReceiverView) -> str:
-    """The caustic map of one light and receiver view: flux per texel."""
-    return light.resource(f"caustic_map.{receiver.name}.flux")
+            self.draw_splats(ctx, light, receiver, branch, target)

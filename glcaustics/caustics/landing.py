@@ -21,7 +21,7 @@ from glcaustics.passes.runner import PlanRunner
 from glcaustics.scene.model import FloatArray, Light, OpticalKind
 
 if TYPE_CHECKING:
-    from glcaustics.caustics.caustic_map import CausticMap
+    from glcaustics.caustics.light_solve import LightMapMethod
 
 COARSE_CASTER, COARSE_MAP = 128, 384
 LOST_SHARE = 2.5e-4  # of the flux that may fall outside of the window, on each of its four sides
@@ -29,7 +29,7 @@ AIR = {False: 0.02, True: 0.06}  # border of the window; more where the water mo
 
 
 def fit_receivers(
-    method: CausticMap, device: Device, setup: FrameSetup, light: LightSetup, frame: FrameState
+    method: LightMapMethod, device: Device, setup: FrameSetup, light: LightSetup, frame: FrameState
 ) -> dict[str, float]:
     """Set the windows of `light.receivers` so that they hold the landing light.
 
@@ -59,11 +59,11 @@ def fit_receivers(
 
 
 def _coarse_solve(
-    method: CausticMap, device: Device, setup: FrameSetup, light: LightSetup, frame: FrameState
+    method: LightMapMethod, device: Device, setup: FrameSetup, light: LightSetup, frame: FrameState
 ) -> tuple[dict[str, tuple[FloatArray, FloatArray]], dict[str, float]]:
     """Landing points (N, 3) and their flux (N,) in each receiver view, and the landed share of each branch kind."""
     graph = FrameGraph()
-    branches = branches_of(setup, light)
+    branches = branches_of(setup, light, method.name)
     method.declare_solves(graph, setup, light, branches)
     runner = PlanRunner(device, graph.compile(outputs=[r for b in branches for r in (b.landing, b.flux)]), setup)
     points: dict[str, list[FloatArray]] = {}
