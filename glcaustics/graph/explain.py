@@ -56,6 +56,10 @@ def _table(rows: Sequence[tuple[str, ...]]) -> list[str]:
 def explain(plan: Plan) -> str:
     """Every pass in execution order with what it reads and writes, then what is left out and why, then memory."""
     lines = _table(_rows(plan))
+    told = [step for step in plan.steps if step.decl.note]
+    if told:
+        width = max(len(step.name) for step in told)
+        lines += ["", *(f"{step.name.ljust(width)}  {step.decl.note}" for step in told)]
     if plan.left_out:
         width = max(len(left.name) for left in plan.left_out)
         lines.append("")
