@@ -17,7 +17,7 @@ from glcaustics.caustics.registry import AUTO, NONE, pick
 from glcaustics.errors import UsageError
 from glcaustics.gpu import Device, create_device
 from glcaustics.graph import FrameGraph, Plan
-from glcaustics.passes import gbuffer, lighting, refraction, rsm, shadow_map, tonemap
+from glcaustics.passes import depth_chain, gbuffer, lighting, refraction, rsm, shadow_map, tonemap
 from glcaustics.passes.frame import CameraState, FrameSetup, FrameState
 from glcaustics.passes.geometry import GpuScene
 from glcaustics.passes.runner import PlanRunner
@@ -31,15 +31,28 @@ AOVS: dict[str, str] = {
     "normal_ws": "normal of the first surface, towards the eye, world space",
     "position_ws": "position of the first surface, metres, world space",
     "albedo": "base colour of the opaque layer, linear",
-    "solve_status": "eye ray: 0 opaque, 1 solved, 2 sky, 3 fallback to the straight pixel, 4 total internal reflection",
+    "solve_status": "eye ray: 0 opaque, 1 solved by Newton's method, 2 sky, 3 fallback by estimate (Sousa 2005), "
+    "4 total internal reflection, 5 solved by marching, 6 leaves the picture, 7 hidden behind something",
+    "solve_hit": "where the eye ray was solved: uv (origin at the bottom left), and the solver's error in pixels",
+    "solve_iterations": "texel look-ups of the eye ray's solver",
 }
 
 BASE_LADDER: dict[str, dict[str, Any]] = {
-    "draft": {"shadow_size": 512, "rsm_size": 256, "refraction_iterations": 2, "reflection_steps": 8},
-    "low": {"shadow_size": 1024, "rsm_size": 512, "refraction_iterations": 3, "reflection_steps": 12},
-    "medium": {"shadow_size": 1536, "rsm_size": 1024, "refraction_iterations": 4, "reflection_steps": 20},
-    "high": {"shadow_size": 2048, "rsm_size": 2048, "refraction_iterations": 6, "reflection_steps": 32},
-    "reference": {"shadow_size": 4096, "rsm_size": 2048, "refraction_iterations": 8, "reflection_steps": 64},
+    quality: {
+        "shadow_size": shadow,
+        "rsm_size": rsm_size,
+        "refraction": solver,
+        "refraction_iterations": iterations,
+        "refraction_steps": steps,
+        "reflection_steps": reflection,
+    }
+    for quality, shadow, rsm_size, solver, iterations, steps, reflection in (
+        ("draft", 512, 256, "newton", 3, 256, 24),
+        ("low", 1024, 512, "cascade", 3, 1024, 32),
+        ("medium", 1536, 1024, "cascade", 4, 4096, 48),
+        ("high", 2048, 2048, "cascade", 6, 8192, 96),
+        ("reference", 4096, 2048, "cascade", 8, 16384, 256),
+    )
 }
 
 
@@ -84,6 +97,9 @@ def resolve_options(method: type[CausticsMethod] | None, quality: str, options: 
         resolved[name] = {"true": True, "false": False}.get(value, value) if isinstance(value, str) else value
     for name, base in BASE_LADDER[quality].items():
         value = resolved[name]
+        if name == "refraction":
+            refraction.check_solver(value)
+            continue
         if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 16384:
             raise UsageError(
                 f"option {name} is {value!r}", where="--set", remedy=f"give a whole number from 1, such as {base}"
@@ -104,6 +120,8 @@ def _aov_resources(setup: FrameSetup, aovs: tuple[str, ...], specular: bool, cau
         "position_ws": ["gbuffer.depth_m", *(["specular.depth_m"] if specular else [])],
         "albedo": ["gbuffer.albedo"],
         "solve_status": (["view.solve_status"] if specular else []),
+        "solve_hit": (["view.solve"] if specular else []),
+        "solve_iterations": (["view.solve"] if specular else []),
     }
     for name in aovs:
         if name not in resources:
@@ -140,6 +158,7 @@ def _declare(
             gbuffer.declare_back(graph, setup)
         else:
             graph.leave_out("gbuffer.specular_back", "nothing in the scene is a solid with two interfaces")
+        depth_chain.declare(graph, setup)
         refraction.declare(graph, setup)
     else:
         for name in ("gbuffer.specular", "gbuffer.specular_back", "refraction"):
@@ -422,6 +441,9 @@ class Renderer:
             return self._read("gbuffer.albedo", 3)
         if name == "solve_status":
             return self._read("view.solve_status", 1) if specular else np.zeros((height, width), np.float32)
+        if name in ("solve_hit", "solve_iterations"):
+            solve = self._read("view.solve", 4) if specular else np.zeros((height, width, 4), np.float32)
+            return solve[..., :3] if name == "solve_hit" else solve[..., 3]
         if name == "normal_ws":
             normal = self._read("gbuffer.normal_ws", 3)
             if specular:

@@ -350,8 +350,9 @@ class PassContext:
         self._framebuffers = framebuffers
 
     def texture(self, resource: str) -> moderngl.Texture:
-        """A declared read. Raises GraphError otherwise."""
-        check_read(self.step, resource)
+        """A declared read, or what an earlier draw of the same pass wrote. Raises GraphError otherwise."""
+        if resource not in self.step.live_writes:
+            check_read(self.step, resource)
         return self._textures[resource]
 
     def has(self, resource: str) -> bool:
@@ -365,8 +366,11 @@ class PassContext:
         return resource in self.step.live_writes
 
     def target(self, *resources: str, depth: str | None = None) -> moderngl.Framebuffer:
-        """A framebuffer of the live ones among the attachments, in order. Kept from frame to frame."""
-        for resource in (*resources, *([depth] if depth else [])):
+        """A framebuffer of the live ones among the attachments, in order. Kept from frame to frame.
+
+        `depth`: written by this pass, or a declared read to test against (draw without writing it).
+        """
+        for resource in (*resources, *([depth] if depth and depth not in self.step.readable else [])):
             if resource not in self.step.decl.writes:
                 check_write(self.step, resource)
         colors = [self._textures[r] for r in resources if r in self.step.live_writes]

@@ -11,7 +11,7 @@ from glcaustics.passes.geometry import SPECULAR_KINDS, DrawItem
 from glcaustics.scene.model import OpticalKind
 
 SHADER = "passes/gbuffer/gbuffer"
-NOTHING = {"HAS_ALBEDO": 0, "HAS_MATERIAL": 0, "HAS_EMISSIVE": 0, "HAS_MOTION": 0}
+NOTHING = {"HAS_ALBEDO": 0, "HAS_MATERIAL": 0, "HAS_EMISSIVE": 0, "HAS_MOTION": 0, "HAS_PLANE": 0}
 
 
 def declare_opaque(graph: FrameGraph, setup: FrameSetup) -> None:
@@ -24,6 +24,7 @@ def declare_opaque(graph: FrameGraph, setup: FrameSetup) -> None:
         "gbuffer.material": TextureDesc("rg16f", size),
         "gbuffer.emissive": TextureDesc("rgba16f", size, "cd/m^2"),
         "gbuffer.motion": TextureDesc("rg16f", size, "uv"),
+        "gbuffer.plane": TextureDesc("rgba32f", size),
         "gbuffer.depth": TextureDesc("depth24", size),
     }
     graph.add(
@@ -39,7 +40,7 @@ def declare_opaque(graph: FrameGraph, setup: FrameSetup) -> None:
 
 
 def _draw_opaque(ctx: PassContext) -> None:
-    names = ("depth_m", "normal_ws", "albedo", "material", "emissive", "motion")
+    names = ("depth_m", "normal_ws", "albedo", "material", "emissive", "motion", "plane")
     target = ctx.target(*(f"gbuffer.{n}" for n in names), depth="gbuffer.depth")
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
     live = ctx.locations(**{n.upper(): f"gbuffer.{n}" for n in names})
@@ -54,6 +55,7 @@ def declare_specular(graph: FrameGraph, setup: FrameSetup) -> None:
             {
                 "specular.depth_m": TextureDesc("r32f", setup.size, "m"),
                 "specular.normal_ws": TextureDesc("rgba32f", setup.size),
+                "specular.plane": TextureDesc("rgba32f", setup.size),
                 "specular.depth": TextureDesc("depth24", setup.size),
             },
             _draw_specular,
@@ -66,9 +68,9 @@ def declare_specular(graph: FrameGraph, setup: FrameSetup) -> None:
 
 
 def _draw_specular(ctx: PassContext) -> None:
-    target = ctx.target("specular.depth_m", "specular.normal_ws", depth="specular.depth")
+    target = ctx.target("specular.depth_m", "specular.normal_ws", "specular.plane", depth="specular.depth")
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-    live = ctx.locations(DEPTH_M="specular.depth_m", NORMAL_WS="specular.normal_ws")
+    live = ctx.locations(DEPTH_M="specular.depth_m", NORMAL_WS="specular.normal_ws", PLANE="specular.plane")
     defines = {**NOTHING, **live, "LAYER_SPECULAR": 1, "BACK": 0}
     _draw(
         ctx,
@@ -85,8 +87,8 @@ def declare_back(graph: FrameGraph, setup: FrameSetup) -> None:
         PassDecl(
             "gbuffer.specular_back",
             {
-                "specular.back_depth_m": TextureDesc("r32f", setup.size, "m"),
-                "specular.back_normal_ws": TextureDesc("rgba32f", setup.size),
+                "specular.back_normal_ws": TextureDesc("rgba32f", setup.size, filter="linear"),
+                "specular.back_plane": TextureDesc("rgba32f", setup.size),
                 "specular.back_depth": TextureDesc("depth24", setup.size),
             },
             _draw_back,
@@ -99,10 +101,10 @@ def declare_back(graph: FrameGraph, setup: FrameSetup) -> None:
 
 
 def _draw_back(ctx: PassContext) -> None:
-    target = ctx.target("specular.back_depth_m", "specular.back_normal_ws", depth="specular.back_depth")
+    target = ctx.target("specular.back_normal_ws", "specular.back_plane", depth="specular.back_depth")
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-    live = ctx.locations(DEPTH_M="specular.back_depth_m", NORMAL_WS="specular.back_normal_ws")
-    defines = {**NOTHING, **live, "LAYER_SPECULAR": 0, "BACK": 1}
+    live = ctx.locations(NORMAL_WS="specular.back_normal_ws", PLANE="specular.back_plane")
+    defines = {**NOTHING, "HAS_DEPTH_M": 0, **live, "LAYER_SPECULAR": 0, "BACK": 1}
     fronts = {"t_front_depth_m": ctx.texture("specular.depth_m"), "t_front_normal": ctx.texture("specular.normal_ws")}
     _draw(ctx, target, ctx.frame.gpu.select(OpticalKind.SOLID), defines, fronts, cull="front")
 

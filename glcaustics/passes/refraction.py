@@ -2,13 +2,44 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+from glcaustics.errors import UsageError
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes.frame import FrameSetup, PassContext
 from glcaustics.passes.lighting import sky_uniforms
+from glcaustics.passes.raster import raster_uniforms
+from glcaustics.scene.model import OpticalKind
+
+SOLVERS: dict[str, str] = {
+    "cascade": "Newton, then hierarchical marching for the pixels that failed, then an estimate",
+    "newton": "Newton's method alone (Mayer, Assarsson, Sintorn 2026), then an estimate; reflections show the sky",
+    "dda": "pixel by pixel (McGuire and Mara 2014)",
+    "hierarchical": "marching over a chain of depth bounds (Uludag 2014)",
+    "sousa": "the straight pixel, moved (Sousa 2005)",
+}
+PLANES, CHAIN = ("gbuffer.plane",), ("depth_chain.bounds_4", "depth_chain.bounds_16")
+_MARCH = {"cascade": 2, "newton": 0, "dda": 1, "hierarchical": 2, "sousa": 0}
+OUTPUTS = {
+    "RADIANCE": "view.radiance",
+    "CAUSTICS_VIEW": "view.caustic_irradiance",
+    "STATUS": "view.solve_status",
+    "SOLVE": "view.solve",
+}
+UNSOLVED = "view.unsolved"
+
+
+def check_solver(name: object) -> None:
+    """Raises UsageError for an unknown `refraction` option."""
+    if name not in SOLVERS:
+        raise UsageError(f"option refraction is {name!r}", where="--set", remedy=f"use one of {', '.join(SOLVERS)}")
 
 
 def declare(graph: FrameGraph, setup: FrameSetup) -> None:
     """Fresnel, refraction with (n/n')^2, absorption, reflection; see `refraction.frag`."""
+    solver = str(setup.options["refraction"])
+    cascade = solver == "cascade"
+    solids = OpticalKind.SOLID in setup.kinds()
     graph.add(
         PassDecl(
             "refraction",
@@ -16,47 +47,103 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
                 "view.radiance": TextureDesc("rgba32f", setup.size, "cd/m^2"),
                 "view.caustic_irradiance": TextureDesc("rgba32f", setup.size, "lux"),
                 "view.solve_status": TextureDesc("r32f", setup.size),
+                "view.solve": TextureDesc("rgba32f", setup.size),
+                **({UNSOLVED: TextureDesc("r8", setup.size)} if cascade else {}),
             },
             _execute,
-            reads=("shade.radiance", "gbuffer.depth_m", "specular.depth_m", "specular.normal_ws"),
-            optional=("specular.back_depth_m", "specular.back_normal_ws", "caustics.irradiance"),
-            note="what water, glass and mirrors show",
+            reads=(
+                *("shade.radiance", "gbuffer.depth_m", "specular.depth", "specular.depth_m", "specular.normal_ws"),
+                *(PLANES if solver != "sousa" else ()),
+                *(CHAIN if _MARCH[solver] == 2 else ()),
+                *(("specular.plane", "specular.back_plane", "specular.back_normal_ws") if solids else ()),
+            ),
+            optional=("caustics.irradiance",),
+            always_writes=(UNSOLVED,) if cascade else (),
+            note=f"what water, glass and mirrors show; eye rays: {SOLVERS[solver]}",
         )
     )
 
 
 def _execute(ctx: PassContext) -> None:
-    outputs = ctx.locations(
-        RADIANCE="view.radiance", CAUSTICS_VIEW="view.caustic_irradiance", STATUS="view.solve_status"
-    )
-    back = ctx.has("specular.back_depth_m")
-    caustics = bool(outputs["HAS_CAUSTICS_VIEW"])
-    target = ctx.target("view.radiance", "view.caustic_irradiance", "view.solve_status")
-    program = ctx.device.program("passes/refraction/refraction", {**outputs, "HAS_BACK": int(back)})
-    textures = {
-        "t_radiance": ctx.texture("shade.radiance"),
-        "t_opaque_depth_m": ctx.texture("gbuffer.depth_m"),
-        "t_specular_depth_m": ctx.texture("specular.depth_m"),
-        "t_specular_normal": ctx.texture("specular.normal_ws"),
-        "t_objects": ctx.frame.gpu.objects,
+    solver = str(ctx.setup.options["refraction"])
+    device = ctx.device
+    names = tuple(OUTPUTS.values())
+    locations = ctx.locations(**OUTPUTS)
+    plain = ctx.target(*names, depth="specular.depth")
+    base = {**locations, "HAS_UNSOLVED": 0}
+    with device.timer("refraction/opaque"):
+        program = device.program("passes/refraction/opaque", base)
+        program.set_all(_textures(ctx))
+        device.draw_fullscreen(program, plain, depth_func="<=")
+    if solver != "cascade":
+        stage = {"NEWTON": int(solver == "newton"), "MARCH": _MARCH[solver], "SOUSA": int(solver == "sousa")}
+        with device.timer(f"refraction/{solver}"):
+            device.draw_fullscreen(_program(ctx, base, **stage, FINAL=1), plain, depth_func=">")
+        return
+    first = {**locations, "HAS_UNSOLVED": 1, "LOCATION_UNSOLVED": sum(locations[f"HAS_{k}"] for k in OUTPUTS)}
+    with device.timer("refraction/newton"):
+        target = ctx.target(*names, UNSOLVED, depth="specular.depth")
+        device.draw_fullscreen(_program(ctx, first, NEWTON=1, MARCH=0, SOUSA=0, FINAL=0), target, depth_func=">")
+    with device.timer("refraction/marching"):
+        program = _program(ctx, base, NEWTON=1, MARCH=_MARCH[solver], SOUSA=0, FINAL=1, RETRY=1)
+        device.draw_fullscreen(program, plain, depth_func=">")
+    if not ctx.live("view.radiance"):
+        return
+    with device.timer("refraction/reflection"):
+        alone = {**{f"HAS_{name}": 0 for name in OUTPUTS}, "HAS_RADIANCE": 1, "LOCATION_RADIANCE": 0, "HAS_UNSOLVED": 0}
+        program = _program(ctx, alone, NEWTON=0, MARCH=_MARCH[solver], SOUSA=0, FINAL=1, RETRY=1, REFLECTION=1)
+        target = ctx.target("view.radiance", depth="specular.depth")
+        device.draw_fullscreen(program, target, depth_func=">", blend="add")
+
+
+def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
+    """The shader's permutation for one stage, its uniforms set."""
+    kinds = ctx.setup.kinds()
+    defines = {
+        **outputs,
+        "FINAL": stage["FINAL"],
+        "RETRY": stage.get("RETRY", 0),
+        "REFLECTION": stage.get("REFLECTION", 0),
+        "USE_NEWTON": stage["NEWTON"],
+        "USE_MARCH": stage["MARCH"],
+        "USE_SOUSA": stage["SOUSA"],
+        "HAS_SOLID": int(OpticalKind.SOLID in kinds),
+        "HAS_MIRROR": int(OpticalKind.MIRROR in kinds),
     }
-    if back:
-        textures |= {
-            "t_back_depth_m": ctx.texture("specular.back_depth_m"),
-            "t_back_normal": ctx.texture("specular.back_normal_ws"),
-        }
-    if caustics:
-        textures["t_caustics"] = ctx.texture("caustics.irradiance")
+    program = ctx.device.program("passes/refraction/refraction", defines)
     low, high = ctx.setup.scene_bounds_ws
+    options = ctx.setup.options
     program.set_all(
         {
             **ctx.frame.uniforms(),
+            **raster_uniforms(ctx.frame.camera, ctx.setup.size),
             **sky_uniforms(ctx.setup),
-            **textures,
+            **_textures(ctx),
             "u_bounds_min_ws": tuple(low),
             "u_bounds_max_ws": tuple(high),
-            "u_refraction_iterations": int(ctx.setup.options["refraction_iterations"]),
-            "u_reflection_steps": int(ctx.setup.options["reflection_steps"]),
+            "u_refraction_iterations": int(options["refraction_iterations"]),
+            "u_refraction_steps": int(options["refraction_steps"]),
+            "u_reflection_steps": int(options["reflection_steps"]),
+            **({"t_unsolved": ctx.texture(UNSOLVED)} if stage.get("RETRY") else {}),
         }
     )
-    ctx.device.draw_fullscreen(program, target)
+    return program
+
+
+def _textures(ctx: PassContext) -> dict[str, Any]:
+    samplers = {
+        "t_radiance": "shade.radiance",
+        "t_opaque_depth_m": "gbuffer.depth_m",
+        "t_specular_depth_m": "specular.depth_m",
+        "t_specular_normal": "specular.normal_ws",
+        "t_plane": "gbuffer.plane",
+        "t_bounds_4": "depth_chain.bounds_4",
+        "t_bounds_16": "depth_chain.bounds_16",
+        "t_front_plane": "specular.plane",
+        "t_front_normal": "specular.normal_ws",
+        "t_back_plane": "specular.back_plane",
+        "t_back_normal": "specular.back_normal_ws",
+        "t_caustics": "caustics.irradiance",
+    }
+    found = {name: ctx.texture(resource) for name, resource in samplers.items() if ctx.has(resource)}
+    return {**found, "t_objects": ctx.frame.gpu.objects}

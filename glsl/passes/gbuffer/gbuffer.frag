@@ -56,8 +56,17 @@ layout(location = LOCATION_EMISSIVE) out vec4 o_emissive;      // radiance, cd/m
 #if HAS_MOTION
 layout(location = LOCATION_MOTION) out vec2 o_motion;          // uv now - uv in the last frame
 #endif
+#if HAS_PLANE
+layout(location = LOCATION_PLANE) out vec4 o_plane;            // tangent plane in raster space (common/raster_ray.glsl): g, c; w: depth
+#endif
 
 void main() {
+#if HAS_PLANE
+    // Derivatives before any discard. The triangle's own plane: smooth normals would not agree with the depths beside it.
+    float s = u_eye_direction.w == 1.0 ? -v_depth_m : gl_FragCoord.w;
+    vec2 g = vec2(dFdx(s), dFdy(s));
+    o_plane = vec4(g, s - dot(g, gl_FragCoord.xy), v_depth_m);
+#endif
 #if LAYER_SPECULAR
     float opaque_m = texelFetch(t_opaque_depth_m, ivec2(gl_FragCoord.xy), 0).r;
     if (opaque_m > 0.0 && v_depth_m >= opaque_m) discard;

@@ -18,12 +18,13 @@ uniform sampler2D t_caustics;
 #endif
 
 in vec2 v_uv;
-layout(location = 0) out vec4 o_radiance;
+layout(location = 0) out vec4 o_radiance;   // alpha: depth in metres, 0 = sky; refraction tells surfaces apart by it
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    if (texelFetch(t_depth_m, pixel, 0).r <= 0.0) {
-        o_radiance = vec4(glc_sky_radiance(glc_camera_ray_ws(v_uv)), 1.0);
+    float depth_m = texelFetch(t_depth_m, pixel, 0).r;
+    if (depth_m <= 0.0) {
+        o_radiance = vec4(glc_sky_radiance(glc_camera_ray_ws(v_uv)), 0.0);
         return;
     }
     vec3 n = texelFetch(t_normal_ws, pixel, 0).xyz;
@@ -42,5 +43,5 @@ void main() {
 #if HAS_EMISSIVE
     radiance += texelFetch(t_emissive, pixel, 0).rgb;
 #endif
-    o_radiance = vec4(radiance, 1.0);
+    o_radiance = vec4(radiance, depth_m);
 }

@@ -1,0 +1,68 @@
+#include "common/raster_ray.glsl"
+
+// Where a ray meets the surfaces of a G-buffer, by Newton's method (Mayer, Assarsson, Sintorn 2026, sec. 2): intersect the ray
+// with the tangent plane of the sample, project, resample. One fetch an iteration: the buffer stores the tangent planes of its
+// texels in raster space, so that a plane passes exactly through its texel's centre (snapped reconstruction).
+// Beyond the paper: an iterate that leaves the bracket of points known in front of and behind the surfaces is replaced by
+// bisection; a bracket of less than a pixel without a surface in it is a discontinuity; one that runs off the picture is told
+// apart; and a sample counts only where the ray really crosses its plane from the front within a pixel of the texel's centre,
+// so that objects beside or before the ray never leave ghosts.
+
+#define GLC_SOLVE_HIT 1
+#define GLC_SOLVE_OFFSCREEN 2       // the picture ends before a surface is met
+#define GLC_SOLVE_DISCONTINUITY 3   // no surface within the bracket: an edge
+#define GLC_SOLVE_DIVERGED 4        // out of iterations
+#define GLC_SOLVE_NOTHING 5         // the ray's end is reached in front of every surface
+#define GLC_SOLVE_HIDDEN 6          // the ray's end is reached behind a surface
+
+struct GlcSolve {
+    float u;           // along the ray; of the hit, or the best estimate
+    float u_front;     // last known point in front of a surface
+    vec2 texel;        // whose tangent plane was met
+    float error_px;    // distance of the ray's point on the plane from the plane's texel, max norm
+    int status;
+    int iterations;    // texel look-ups
+};
+
+const float GLC_SOLVE_TOLERANCE_PX = 1.0;
+
+// t_plane: rgba32f planes. facing: 1 for surfaces that the ray enters from the eye's side, -1 for those it leaves towards it.
+GlcSolve glc_newton(sampler2D t_plane, GlcRasterRay ray, float facing, int max_iterations) {
+    GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_DIVERGED, 0);
+    float u = 0.0, behind = 1.0;
+    vec2 last = vec2(textureSize(t_plane, 0)) - 1.0;
+    float extent = max(max(abs(ray.step.x), abs(ray.step.y)), 1e-6);
+    bool at_edge = false;
+    for (int i = 0; i < max_iterations; ++i) {
+        vec2 px = ray.start.xy + u * ray.step.xy;
+        vec2 texel = clamp(floor(px), vec2(0.0), last);
+        vec2 f = facing * glc_raster_plane(ray, texelFetch(t_plane, ivec2(texel), 0));
+        float met = f.x / (f.y < 0.0 ? f.y : -1e-30);
+        vec2 off = abs(ray.start.xy + met * ray.step.xy - texel - 0.5);
+        bool crosses = f.y < 0.0 && met >= 0.0 && met <= 1.0;
+        solve.error_px = max(off.x, off.y);
+        solve.iterations = i + 1;
+        if (crosses && solve.error_px <= GLC_SOLVE_TOLERANCE_PX) {
+            solve.u = met;
+            solve.texel = texel;
+            solve.status = GLC_SOLVE_HIT;
+            break;
+        }
+        if (u * f.y - f.x >= 0.0) solve.u_front = max(solve.u_front, u); else behind = min(behind, u);
+        if (at_edge && crosses && met >= ray.u_screen) {
+            solve.u = met;
+            solve.status = GLC_SOLVE_OFFSCREEN;
+            break;
+        }
+        bool inside = crosses && met > solve.u_front - 1e-6 && met < behind + 1e-6;
+        u = inside ? met : 0.5 * (solve.u_front + behind);
+        at_edge = u >= ray.u_screen;
+        u = min(u, ray.u_screen);
+        solve.u = u;
+        if ((behind - solve.u_front) * extent < 1.0) {
+            solve.status = GLC_SOLVE_DISCONTINUITY;
+            break;
+        }
+    }
+    return solve;
+}

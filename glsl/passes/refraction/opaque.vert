@@ -1,0 +1,7 @@
+// One triangle over the picture on the far plane: the specular layer's depth buffer masks the pixels (empty ones hold 1).
+out vec2 v_uv;
+
+void main() {
+    v_uv = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);
+    gl_Position = vec4(v_uv * 2.0 - 1.0, 1.0, 1.0);
+}

@@ -1,0 +1,57 @@
+// What the eye's view is written to; only what some pass or AOV reads exists.
+#if HAS_RADIANCE
+layout(location = LOCATION_RADIANCE) out vec4 o_radiance;
+#endif
+#if HAS_CAUSTICS_VIEW
+layout(location = LOCATION_CAUSTICS_VIEW) out vec4 o_caustics;   // E_c at the first non-specular surface of the eye's path
+#endif
+#if HAS_STATUS
+layout(location = LOCATION_STATUS) out float o_status;           // GLC_VIEW_*
+#endif
+#if HAS_SOLVE
+layout(location = LOCATION_SOLVE) out vec4 o_solve;              // uv of the hit, error in pixels, texel look-ups
+#endif
+#if HAS_UNSOLVED
+layout(location = LOCATION_UNSOLVED) out float o_unsolved;       // GLC_TODO_* / 255: what later stages must finish
+#endif
+
+#define GLC_TODO_REFRACTION 1
+#define GLC_TODO_REFLECTION 2
+
+// The way each pixel went; renderer.AOVS documents the same numbers.
+#define GLC_VIEW_OPAQUE 0.0
+#define GLC_VIEW_NEWTON 1.0
+#define GLC_VIEW_SKY 2.0
+#define GLC_VIEW_FALLBACK 3.0
+#define GLC_VIEW_TIR 4.0
+#define GLC_VIEW_MARCHED 5.0
+#define GLC_VIEW_OFFSCREEN 6.0
+#define GLC_VIEW_HIDDEN 7.0
+
+struct Seen {
+    vec3 radiance;
+    vec3 caustics;
+    float distance_m;
+    vec2 uv;
+    float error_px;
+    float iterations;
+    float status;
+};
+
+void write_view(Seen seen, int todo) {
+#if HAS_RADIANCE
+    o_radiance = vec4(seen.radiance, 1.0);
+#endif
+#if HAS_CAUSTICS_VIEW
+    o_caustics = vec4(seen.caustics, 1.0);
+#endif
+#if HAS_STATUS
+    o_status = seen.status;
+#endif
+#if HAS_SOLVE
+    o_solve = vec4(seen.uv, seen.error_px, seen.iterations);
+#endif
+#if HAS_UNSOLVED
+    o_unsolved = float(todo) / 255.0;
+#endif
+}
