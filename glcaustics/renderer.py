@@ -253,6 +253,13 @@ class Renderer:
         self.aovs = tuple(aovs)
         self.specular_view = specular_view
         self._target = target
+        self._present: moderngl.Framebuffer | None = None
+        if target is not None and target.size != self.size:
+            shown = "x".join(str(n) for n in target.size)
+            raise UsageError(
+                f"the target framebuffer is {shown}, the picture {self.size[0]}x{self.size[1]}",
+                remedy="make both the same size",
+            )
         self._chosen = pick(self.method_name)
         resolved = resolve_options(self._chosen, quality, options or {})
         self._method = self._chosen() if self._chosen else None
@@ -283,6 +290,8 @@ class Renderer:
         if self.device.closed:
             return
         with self.device.guard_state():
+            if self._present is not None:
+                self.device.release_framebuffers([self._present])
             if self._runner is not None:
                 self._runner.release()
             self._gpu.release()
@@ -406,9 +415,9 @@ class Renderer:
 
     def _copy_to_target(self, runner: PlanRunner) -> None:
         assert self._target is not None
-        source = self.device.framebuffer([runner.texture("present.ldr")], label="present")
-        self.device.ctx.copy_framebuffer(self._target, source)
-        self.device.release_framebuffers([source])
+        if self._present is None:
+            self._present = self.device.framebuffer([runner.texture("present.ldr")], label="present")
+        self.device.ctx.copy_framebuffer(self._target, self._present)
 
     # -- read-back ----------------------------------------------------------------------------------------------------
 
