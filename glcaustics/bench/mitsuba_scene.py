@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from glcaustics.bench.scene_export import world_normals
 from glcaustics.bench.targets import SPECULAR, luminance
 from glcaustics.errors import UsageError
 from glcaustics.scene.model import Camera, Instance, Light, LightKind, OpticalKind, Scene
@@ -78,7 +79,7 @@ def spectrum(mi: Any, color: npt.ArrayLike) -> Any:
 
 def mesh(mi: Any, instance: Instance, bsdf: Any, reflectance: FloatArray | None = None) -> Any:
     """The instance in world space with its smooth normals; `reflectance`: (V, 1) or (V, 3) of its vertices."""
-    points, normals = instance.positions_ws(), normals_ws(instance)
+    points, normals = instance.positions_ws(), world_normals(instance)
     faces = instance.mesh.triangles.astype(np.uint32)
     if np.linalg.det(instance.world_from_object[:3, :3]) < 0.0:
         faces = faces[:, ::-1]
@@ -96,16 +97,9 @@ def mesh(mi: Any, instance: Instance, bsdf: Any, reflectance: FloatArray | None 
     return made
 
 
-def normals_ws(instance: Instance) -> FloatArray:
-    """Vertex normals in world space, (V, 3) float64, unit length."""
-    inverse = np.linalg.inv(instance.world_from_object[:3, :3])
-    normals = instance.mesh.normals.astype(np.float64) @ inverse
-    return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
-
-
 def schlick_at_vertices(instance: Instance, light: Light) -> FloatArray:
     """Reflectance (V, 3) of a metal under one light: f0 + (1 - f0)(1 - cos)^5 (Schlick 1994; glTF 2.0)."""
-    normals, f0 = normals_ws(instance), np.asarray(instance.material.base_color)
+    normals, f0 = world_normals(instance), np.asarray(instance.material.base_color)
     if light.kind is LightKind.DIRECTIONAL:
         towards = np.broadcast_to(-unit(light.direction_ws), normals.shape)
     else:

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from glcaustics.bench.beam_export import beam_scene
 from glcaustics.bench.mitsuba_scene import aimed_light, best_variant, camera_sensor, film, look, mitsuba, shapes
+from glcaustics.bench.scene_export import beam_scene
 from glcaustics.bench.store import Store, digest, scene_key
 from glcaustics.bench.targets import Target, casters, luminance
 from glcaustics.errors import UsageError
@@ -81,6 +81,7 @@ class PhotonMap:
             parts["sensor"] = self._pinhole.sensor(mi)
             self._scenes.append(mi.load_dict(parts))
         self._depth = target.interfaces + 2
+        self.seconds = 0.0  # spent on passes of the full depth since somebody set this to 0
 
     def render(self, photons: int, seed: int, *, direct: bool = False) -> FloatArray:
         """Caustic irradiance (H, W), luminance, by at least `photons` photons in passes averaged in float64.
@@ -94,7 +95,9 @@ class PhotonMap:
         while done < spp:
             count = min(SAMPLES_PER_PASS, spp - done)
             run = seed * SEED_STRIDE + done // SAMPLES_PER_PASS
+            start = time.perf_counter()
             image = self._pass(self._depth, count, run)
+            self.seconds += time.perf_counter() - start
             if not direct:
                 image = image - self._pass(2, count, run)
             total += image * count

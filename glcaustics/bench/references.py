@@ -6,8 +6,8 @@ import time
 
 import numpy as np
 
-from glcaustics.bench.beam_export import beam_scene
 from glcaustics.bench.mitsuba_truth import Halves
+from glcaustics.bench.scene_export import beam_scene
 from glcaustics.bench.store import Store, digest, scene_key
 from glcaustics.bench.targets import Target, luminance
 from glcaustics.optics.receivers import PlaneGrid

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from glcaustics.errors import UsageError
+from glcaustics.optics.reference_cache import cache_folder
 from glcaustics.output import write_bytes, write_text
 from glcaustics.scene.model import Scene
 
@@ -21,10 +21,8 @@ Arrays = dict[str, npt.NDArray[Any]]
 
 
 def default_cache() -> Path:
-    """`$GLC_BENCH_CACHE`, else `glcaustics/bench` in the user's cache directory."""
-    if path := os.environ.get("GLC_BENCH_CACHE"):
-        return Path(path)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "glcaustics" / "bench"
+    """`bench` in the folder of the reference cache (`$GLCAUSTICS_CACHE`, else `~/.cache/glcaustics`)."""
+    return cache_folder() / "bench"
 
 
 def digest(*parts: Any) -> str:

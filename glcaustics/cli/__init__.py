@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Sequence
 
+from glcaustics.cli.bench import bench_command
 from glcaustics.cli.compare import compare_command
 from glcaustics.cli.doctor import doctor_command
 from glcaustics.cli.listing import methods_command, plan_command, scenes_command
@@ -21,6 +22,7 @@ HANDLERS = {
     "plan": plan_command,
     "scenes": scenes_command,
     "methods": methods_command,
+    "bench": bench_command,
     "doctor": doctor_command,
     "compare": compare_command,
 }

@@ -46,6 +46,9 @@ def build_parser(handlers: Mapping[str, Callable[[argparse.Namespace], int]]) ->
     compare.add_argument("-o", "--output", metavar="FILE.png", help="write a map of the absolute error")
     compare.add_argument("--aov", metavar="NAME", help="buffer of an .npz or .exr to compare (default: image)")
     compare.add_argument("--json", action="store_true", help="print JSON instead of text")
+    _add_bench_options(
+        add("bench", "measure error against run time of every method and of its peers", epilog=_BENCH_EPILOG)
+    )
     doctor = add("doctor", "show what this machine offers, what is missing, and the command that mends it")
     doctor.add_argument("--backend", choices=BACKENDS[1:], help="look at one backend alone (default: all)")
     doctor.add_argument("--json", action="store_true", help="print JSON instead of text")
@@ -113,6 +116,30 @@ def _add_render_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("--seed", type=seed, default=0, metavar="N", help="seed of everything random (default: 0)")
     command.add_argument("--backend", choices=BACKENDS, default="auto", help="how to get OpenGL (default: auto)")
     command.add_argument("--json", metavar="FILE", help="write the frame's numbers as JSON; '-' for standard output")
+
+
+_BENCH_EPILOG = (
+    "Writes report.json, report.html and plots/*.png. Broken off, it goes on where it stopped. "
+    "Needs the extra 'bench'. With --check the exit code is 1 when something got worse."
+)
+
+
+def _add_bench_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument("-o", "--output", default="bench-report", metavar="DIR", help="default: bench-report")
+    command.add_argument("--quick", action="store_true", help="four scenes, small, in under three minutes")
+    for name, text in (("scenes", "of the built-in ones"), ("methods", "see methods"), ("qualities", "draft to high")):
+        command.add_argument(f"--{name}", nargs="+", action="extend", metavar="NAME", help=text)
+    command.add_argument("--sizes", nargs="+", type=positive_int, metavar="N", help="sides of the maps, pixels")
+    command.add_argument("--backend", choices=BACKENDS, default="auto", help="how to get OpenGL (default: auto)")
+    for name, text in (
+        ("peers", "Mitsuba's ptracer, alone and denoised, in the same run"),
+        ("validate", "hold the reference beams against Mitsuba"),
+        ("scaling", "run time against pixels, light samples and triangles"),
+    ):
+        command.add_argument(f"--{name}", action=argparse.BooleanOptionalAction, default=True, help=text)
+    command.add_argument("--check", metavar="STORED.json", help="compare with a stored report, by ratios")
+    command.add_argument("--report", metavar="REPORT.json", help="with --check: take this report, measure nothing")
+    command.add_argument("--table", metavar="REPORT.json", help="print the README's table of a report, and stop")
 
 
 # ------------------------------------------------------------------ values

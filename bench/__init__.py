@@ -1,0 +1,1 @@
+"""The bench: references, peers and error against run time."""

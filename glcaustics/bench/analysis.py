@@ -1,0 +1,158 @@
+"""What rows say together: scaling exponents, Pareto front, regressions against a stored report, the README's table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+Row = Mapping[str, Any]
+ERROR_RATIO, ERROR_FLOOR = 1.15, 0.003  # noise of random methods and of the references stays below these
+TIME_RATIO = 1.6  # of the ratio to the run without caustics, which takes the machine's speed out
+
+
+def fit_power(x: Sequence[float], y: Sequence[float]) -> dict[str, float] | None:
+    """Least squares of log y = exponent log x + log factor; None with fewer than three usable points.
+
+    `spread`: largest factor by which a point is off the line.
+    """
+    points = [(a, b) for a, b in zip(x, y, strict=True) if a > 0 and b > 0]
+    if len(points) < 3:
+        return None
+    lx, ly = np.log(np.array(points)).T
+    if np.ptp(lx) == 0.0:
+        return None
+    exponent, offset = np.polyfit(lx, ly, 1)
+    spread = float(np.exp(np.abs(ly - exponent * lx - offset).max()))
+    return {"exponent": float(exponent), "factor": float(np.exp(offset)), "spread": spread}
+
+
+def pareto(points: Iterable[tuple[float, float]]) -> list[int]:
+    """Indices of the points (cost, error) that no other one beats in both, by rising cost."""
+    listed = list(points)
+    front: list[int] = []
+    best = math.inf
+    for index in sorted(range(len(listed)), key=lambda i: listed[i]):
+        if listed[index][1] < best:
+            front.append(index)
+            best = listed[index][1]
+    return front
+
+
+def cost_at_error(rows: Sequence[Row], error: float) -> float | None:
+    """Milliseconds that a tool needs for an error, interpolated on the log-log line between its rows.
+
+    None when its rows do not reach that far: nothing is extrapolated.
+    """
+    points = sorted((r["time_ms"]["median"], r["errors"]["rrmse"]) for r in rows if r["errors"].get("rrmse"))
+    for (t0, e0), (t1, e1) in zip(points, points[1:], strict=False):
+        if e1 <= error <= e0 and e0 > e1:
+            share = math.log(e0 / error) / math.log(e0 / e1)
+            return float(t0 * (t1 / t0) ** share)
+    return None
+
+
+def row_id(row: Row) -> str:
+    """What makes two rows of two reports the same measurement."""
+    parts = [row["scene"], row["tool"], row["method"], row["quality"], f"{row['pixels']}px"]
+    return " ".join(str(p) for p in parts)
+
+
+def caustics_ms(rows: Sequence[Row], row: Row) -> float | None:
+    """The frame's median less that of the same frame without caustics; None without such a row."""
+    base = _without_caustics(rows, row)
+    return None if base is None else float(row["time_ms"]["median"] - base["time_ms"]["median"])
+
+
+def relative_time(rows: Sequence[Row], row: Row) -> float | None:
+    """The frame's least time over that of the same frame without caustics; None without such a row."""
+    base = _without_caustics(rows, row)
+    return None if base is None else float(row["time_ms"]["min"] / base["time_ms"]["min"])
+
+
+def _without_caustics(rows: Sequence[Row], row: Row) -> Row | None:
+    same = ("scene", "tool", "quality", "pixels")
+    found = (r for r in rows if r["method"] == "none" and all(r[k] == row[k] for k in same))
+    return next(found, None)
+
+
+def regressions(stored: Mapping[str, Any], new: Mapping[str, Any]) -> tuple[list[str], int]:
+    """What got worse, one line each, and how many rows were compared.
+
+    Errors are compared by ratio with a floor. Times are compared as ratios to the same run's frame without caustics, so
+    that a faster or busier machine does not count.
+    """
+    before = {row_id(r): r for r in stored["rows"]}
+    worse, compared = [], 0
+    for row in new["rows"]:
+        old = before.get(row_id(row))
+        if old is None or row["tool"] != "glcaustics" or row["method"] == "none":
+            continue
+        compared += 1
+        worse += _error_regression(old, row)
+        ratios = [relative_time(report["rows"], r) for report, r in ((stored, old), (new, row))]
+        if ratios[0] and ratios[1] and ratios[1] > TIME_RATIO * ratios[0]:
+            worse.append(
+                f"{row_id(row)}: {ratios[1]:.2f} times the frame without caustics, was {ratios[0]:.2f} "
+                f"(allowed {TIME_RATIO:g} times that)"
+            )
+    return worse, compared
+
+
+def _error_regression(old: Row, row: Row) -> list[str]:
+    if row["errors"]["non_finite"] > old["errors"]["non_finite"]:
+        return [f"{row_id(row)}: {row['errors']['non_finite']:.2%} of the pixels are not finite"]
+    was, now = old["errors"].get("rrmse"), row["errors"].get("rrmse")
+    if was is None or now is None or now <= ERROR_RATIO * was + ERROR_FLOOR:
+        return []
+    return [f"{row_id(row)}: relative RMSE {now:.4f}, was {was:.4f} (allowed {ERROR_RATIO * was + ERROR_FLOOR:.4f})"]
+
+
+def table(report: Mapping[str, Any]) -> str:
+    """Markdown for the README: per scene and quality the error, the times, and what the peers need for that error."""
+    rows = [r for r in report["rows"] if not r.get("overrides")]
+    pixels = max(r["pixels"] for r in rows)
+    rows = [r for r in rows if r["pixels"] == pixels]
+    names = "scene|method|quality|relative RMSE|FLIP|bias|frame ms|of it caustics|ptracer, same error|ptracer + OIDN"
+    head = f"| {names.replace('|', ' | ')} |"
+    lines = [head, "|" + "---|" * 10]
+    for row in rows:
+        if row["tool"] != "glcaustics" or row["method"] == "none":
+            continue
+        e = row["errors"]
+        own = caustics_ms(rows, row)
+        peers = [_peer_cell(rows, row, method) for method in ("ptracer", "ptracer+oidn")]
+        cells = [row["scene"], row["method"], row["quality"]]
+        cells += [_number(e.get("rrmse"), ".4f"), _number(e.get("flip"), ".4f"), _number(e.get("bias"), "+.2%")]
+        cells += [f"{row['time_ms']['median']:.0f}", _number(own, ".0f"), *peers]
+        lines.append("| " + " | ".join(cells) + " |")
+    state = report["machine"]
+    commit = str(report["commit"] or "no checkout")[:10] + (" with changes" if report["dirty"] else "")
+    clock = next(r["time_ms"]["clock"] for r in rows if r["tool"] == "glcaustics")
+    lines += [
+        "",
+        f"Irradiance at {pixels}x{pixels} of each scene's target; {state['gl_renderer']} by {clock}, {state['cpu']}, "
+        f"{state['cores']} cores; commit {commit}; `{report['command']}`.",
+    ]
+    return "\n".join(lines)
+
+
+def _number(value: float | None, form: str) -> str:
+    return "" if value is None else format(value, form)
+
+
+def _peer_cell(rows: Sequence[Row], row: Row, method: str) -> str:
+    error = row["errors"].get("rrmse")
+    mine = [r for r in rows if r["scene"] == row["scene"] and r["tool"] == "mitsuba" and r["method"] == method]
+    if error is None or not mine:
+        return ""
+    cost = cost_at_error(mine, error)
+    if cost is not None:
+        return f"{cost / 1e3:.2g} s"
+    best = min(mine, key=lambda r: r["errors"]["rrmse"])
+    least = best["errors"]["rrmse"]
+    if least > error:
+        return f"> {best['time_ms']['median'] / 1e3:.2g} s (then {least:.3f})"
+    return f"< {min(r['time_ms']['median'] for r in mine) / 1e3:.2g} s"

@@ -1,0 +1,165 @@
+"""One measurement: a scene by one method at one quality and size: its run time, its passes, its error."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from glcaustics import metrics
+from glcaustics.bench.mitsuba_truth import Halves
+from glcaustics.bench.targets import Target, luminance
+from glcaustics.errors import UsageError
+from glcaustics.optics.pixels import box_filter
+from glcaustics.renderer import Renderer
+from glcaustics.scene.model import Scene
+
+FloatArray = npt.NDArray[np.float64]
+WHITE = 4.0  # times the mean irradiance is shown as white where pictures are compared
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How long to measure: at least `least` frames, then until `budget_s` is spent or `most` are done."""
+
+    least: int = 3
+    most: int = 15
+    budget_s: float = 2.0
+
+    def run(self, once: Callable[[], float]) -> list[float]:
+        """Milliseconds of each call, as `once` returns them."""
+        start = time.perf_counter()
+        values: list[float] = []
+        while len(values) < self.least or (len(values) < self.most and time.perf_counter() - start < self.budget_s):
+            values.append(once())
+        return values
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What is rendered. `options`: on top of the quality's."""
+
+    scene: Scene
+    target: Target
+    method: str
+    quality: str
+    pixels: int
+    backend: str = "auto"
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+def summary(values: list[float], kind: str) -> dict[str, Any]:
+    """Median, least and most of the values, ms, and what clock they are by."""
+    return {
+        "median": statistics.median(values),
+        "min": min(values),
+        "max": max(values),
+        "runs": len(values),
+        "clock": kind,
+    }
+
+
+def measure(case: Case, timing: Timing) -> tuple[dict[str, Any], FloatArray]:
+    """A row of the report without its errors, and the irradiance (P, P), luminance, at the target.
+
+    The first frame (set-up, shader compilation) is a warm-up and told apart. On a software renderer a frame's time is
+    the wall clock up to `finish`; on a GPU the sum of its passes' timer queries.
+    """
+    scene = replace(case.scene, camera=case.target.camera(), camera_at=None)
+    begin = time.perf_counter()
+    renderer = Renderer(
+        scene,
+        size=(case.pixels, case.pixels),
+        method=case.method,
+        quality=case.quality,
+        backend=case.backend,
+        aovs=("caustic_irradiance",),
+        specular_view=False,
+        options=case.options,
+    )
+    with renderer:
+        renderer.render()
+        first_ms = 1e3 * (time.perf_counter() - begin)
+        values = timing.run(lambda: _frame_ms(renderer))
+        frame = renderer.render()
+        stats, device = frame.stats, renderer.device
+        row = {
+            "scene": scene.name,
+            "tool": "glcaustics",
+            "method": case.method,
+            "quality": case.quality,
+            "pixels": case.pixels,
+            "options": dict(renderer.options),
+            "overrides": dict(case.options),
+            "time_ms": summary(values, device.timer_kind),
+            "first_frame_ms": first_ms,
+            "passes": stats["passes"],
+            "bytes_allocated": stats["bytes_allocated"],
+            "bytes_without_aliasing": stats["bytes_without_aliasing"],
+            "bytes_without_culling": stats["bytes_without_culling"],
+            "lost_flux": stats["lost_flux"],
+            "rays": sum(s["rays"] for s in stats["solves"]),
+            "backend": device.backend,
+            "gl_renderer": device.info["renderer"],
+        }
+        return row, luminance(frame.aov["caustic_irradiance"])
+
+
+def _frame_ms(renderer: Renderer) -> float:
+    device = renderer.device
+    device.timing_enabled = not device.is_software
+    device.ctx.finish()
+    start = time.perf_counter()
+    renderer.draw()
+    device.ctx.finish()
+    wall_ms = 1e3 * (time.perf_counter() - start)
+    device.timing_enabled = True
+    return wall_ms if device.is_software else sum(device.finish_timings().values())
+
+
+def reduced(halves: Halves, pixels: int) -> Halves:
+    """The same truth at a size that divides its own."""
+    size = (pixels, pixels)
+    return replace(halves, first=box_filter(halves.first, size), second=box_filter(halves.second, size))
+
+
+def errors(truth: Halves, image: FloatArray) -> dict[str, Any]:
+    """Error measures of an irradiance map; `rrmse` has the truth's own noise taken off.
+
+    A map with values that are not finite gets their share and nothing else.
+    """
+    share = metrics.non_finite_share(image)
+    if share > 0.0:
+        return {"non_finite": share}
+    mean = truth.mean
+    return {
+        "rrmse": metrics.relative_rmse(truth.first, image, other_half=truth.second),
+        "mae": metrics.mean_absolute_error(mean, image),
+        "bias": metrics.bias_of_mean(mean, image),
+        "psnr_db": metrics.psnr(mean, image, peak=WHITE * float(mean.mean())),
+        "flip": _flip(mean, image),
+        "non_finite": 0.0,
+    }
+
+
+def display(image: npt.ArrayLike, mean: float) -> FloatArray:
+    """Irradiance as a picture in [0, 1], sRGB encoded; white is `WHITE` times the mean."""
+    linear = np.clip(np.asarray(image, np.float64) / (WHITE * mean), 0.0, 1.0)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def _flip(reference: FloatArray, image: FloatArray) -> float | None:
+    """Mean LDR-FLIP of the pictures that `display` makes; None without the package."""
+    mean = float(reference.mean())
+    pair = [np.repeat(display(x, mean)[..., None], 3, axis=2).astype(np.float32) for x in (reference, image)]
+    try:
+        return metrics.flip(pair[0], pair[1], hdr=False).mean
+    except UsageError as error:
+        if "flip-evaluator" in error.what:
+            return None
+        raise
