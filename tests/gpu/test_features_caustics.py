@@ -158,7 +158,9 @@ def test_slab_of_glass_transmits_by_fresnel_and_beer_lambert(theta: float, clear
     slab = box("slab", (2.0, thick, 2.0), (0.0, 0.5, 0.0), material)
     assert slab.optical_kind is OpticalKind.SOLID
     scene = scene_of([plane("floor", 3.0), slab], [sun(theta)], from_above(2.0))
-    image = caustic(shoot(scene, (PIXELS, PIXELS), quality="high", options=NO_REFLECTION))
+    # What the side faces reflect totally falls on the same floor: another path, left out here.
+    options = {**NO_REFLECTION, "internal_bounces": 0}
+    image = caustic(shoot(scene, (PIXELS, PIXELS), quality="high", options=options))
     cos_i = math.cos(math.radians(theta))
     sin_t = math.sin(math.radians(theta)) / 1.5
     cos_t = math.sqrt(1 - sin_t**2)
