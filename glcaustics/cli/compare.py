@@ -16,9 +16,8 @@ from glcaustics import metrics, output
 from glcaustics.errors import UsageError
 
 READS = (".png", ".npz", ".exr")
-FLIP_MIN_SIDE_PX = 8
-# perceptually even, dark to bright (after matplotlib's magma, CC0): black = equal
-MAGMA = ((0, 0, 4), (40, 17, 89), (101, 26, 128), (159, 47, 127), (212, 72, 107), (245, 125, 98), (254, 188, 130), (252, 253, 191))  # fmt: skip
+# dark to bright in even steps for the eye, after matplotlib's magma (CC0); black = equal
+MAGMA = tuple(bytes.fromhex("000004 281159 651a80 9f2f7f d4486b f57d62 febc82 fcfdbf".replace(" ", "")))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +103,9 @@ def read_picture(path: Path, aov: str | None) -> Picture:
     """
     suffix = path.suffix.lower()
     if suffix not in READS:
-        raise UsageError(f"{suffix or 'no extension'} is not readable", where=str(path), remedy=f"use {', '.join(READS)}")
+        raise UsageError(
+            f"{suffix or 'no extension'} is not readable", where=str(path), remedy=f"use {', '.join(READS)}"
+        )
     if not path.is_file():
         raise UsageError("no such file", where=str(path), remedy="check the path")
     if suffix == ".png" and aov not in (None, "image"):
@@ -178,9 +179,9 @@ def _write_map(target: Path, a: npt.NDArray[np.float64], b: npt.NDArray[np.float
         difference = np.abs(b - a).mean(axis=-1)
     finite = np.isfinite(difference)
     scale = float(np.percentile(difference[finite], 99.5)) or float(difference[finite].max()) or 1.0
-    level = np.clip(np.where(finite, difference, 0.0) / scale, 0.0, 1.0) * (len(MAGMA) - 1)
-    stops = np.asarray(MAGMA, np.float64)
-    colors = np.stack([np.interp(level, np.arange(len(MAGMA)), stops[:, c]) for c in range(3)], axis=-1)
+    level = np.clip(np.where(finite, difference, 0.0) / scale, 0.0, 1.0) * (len(MAGMA) // 3 - 1)
+    stops = np.asarray(MAGMA, np.float64).reshape(-1, 3)
+    colors = np.stack([np.interp(level, np.arange(len(stops)), stops[:, c]) for c in range(3)], axis=-1)
     colors[~finite] = 255.0
     ldr = np.round(colors).astype(np.uint8)
     output.save_frame(target, image=ldr.astype(np.float32), ldr=ldr, aov={})

@@ -1,4 +1,4 @@
-"""Measures of error between images and over time: pure functions on NumPy arrays, no OpenGL, nothing of the renderer."""
+"""Measures of error between images and over time: pure functions on NumPy arrays, no OpenGL, no renderer."""
 
 from glcaustics.metrics.error import (
     bias_of_mean,

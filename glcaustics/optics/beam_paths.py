@@ -1,4 +1,4 @@
-"""Follows rays through one given sequence of specular events, 'T' (refracted) and 'R' (reflected), to where they land."""
+"""Follows rays through one sequence of specular events, 'T' (refracted) and 'R' (reflected), to where they land."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from glcaustics.optics.refract import refract
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
-HASH = np.int64(1000003)
+HASH, HASH_MASK = np.int64(1000003), np.int64(0x7FFFFFFFFFFF)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +35,30 @@ class Landings:
     throughput: FloatArray
 
 
+@dataclass(eq=False)
+class _Rays:
+    """Rays on their way. `index`: in the batch; `sigma`: absorption coefficient of the medium they run in, 1/m."""
+
+    index: IntArray
+    origin: FloatArray
+    direction: FloatArray
+    throughput: FloatArray
+    sigma: FloatArray
+    signature: IntArray
+    last_object: IntArray
+
+    def pick(self, chosen: BoolArray) -> _Rays:
+        return _Rays(
+            self.index[chosen],
+            self.origin[chosen],
+            self.direction[chosen],
+            self.throughput[chosen],
+            self.sigma[chosen],
+            self.signature[chosen],
+            self.last_object[chosen],
+        )
+
+
 class PathTracer:
     """Rays through a scene, for one colour channel's index of refraction."""
 
@@ -47,7 +71,7 @@ class PathTracer:
         self._transmission = np.array([o.transmission for o in optics], np.float64)
         self._reflectance = np.array([o.reflectance for o in optics], np.float64)
 
-    def branches(self, max_events: int, *, reflect: bool = True, min_share: float = 0.0) -> list[str]:
+    def branches(self, max_events: int, *, reflect: bool = True) -> list[str]:
         """Sequences of at most `max_events` events that some light may take, shortest first.
 
         Args:
@@ -66,40 +90,45 @@ class PathTracer:
         """
         n = len(origin_ws)
         out = Landings(np.full(n, -1), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)))
-        index = np.arange(n)
-        origin, direction = origin_ws, direction_ws
-        throughput, sigma = np.ones((n, 3)), np.zeros((n, 3))
-        signature = np.zeros(n, np.int64)
-        last_object = np.full(n, -1)
-        for step, event in enumerate((*branch, "")):
-            hits = self.caster.first_hits(origin, direction, last_object)
-            kind = np.where(hits.object_id >= 0, self._kind[hits.object_id], -1)
-            go_on = kind == SurfaceKind.DIFFUSE if event == "" else kind > SurfaceKind.DIFFUSE
-            if event == "T":
-                go_on &= kind == SurfaceKind.DIELECTRIC
-            index, direction, throughput, sigma, signature = (
-                a[go_on] for a in (index, direction, throughput, sigma, signature)
-            )
-            hits = Hits(*(a[go_on] for a in (hits.object_id, hits.t, hits.point_ws, hits.geometric_ws, hits.normal_ws)))
-            last_object = hits.object_id
-            throughput = throughput * np.exp(-sigma * hits.t[:, None])
-            entering = np.einsum("ij,ij->i", direction, hits.geometric_ws) < 0.0
-            signature = (signature * HASH + 2 * hits.object_id + entering + 1) & 0x7FFFFFFFFFFF
-            normal = _facing(hits, direction, entering)
-            if event == "":
-                out.signature[index], out.point_ws[index], out.normal_ws[index] = signature, hits.point_ws, normal
-                out.direction_ws[index], out.throughput[index] = direction, throughput
-                return out
+        rays = _Rays(
+            np.arange(n),
+            origin_ws,
+            direction_ws,
+            np.ones((n, 3)),
+            np.zeros((n, 3)),
+            np.zeros(n, np.int64),
+            np.full(n, -1),
+        )
+        for step, event in enumerate(branch):
+            rays, hits, normal, entering = self._advance(rays, event)
             if step == 0 and from_light:
-                throughput = throughput * self._source_medium(hits, entering)
-            direction, share, sigma = self._scatter(event, direction, normal, hits.object_id, entering)
-            throughput = throughput * share
-            alive = share.max(axis=1) > 0.0
-            index, direction, throughput, sigma, signature, last_object = (
-                a[alive] for a in (index, direction, throughput, sigma, signature, last_object)
-            )
-            origin = hits.point_ws[alive]
+                rays.throughput = rays.throughput * self._source_medium(hits, entering)
+            direction, share, sigma = self._scatter(event, rays.direction, normal, hits.object_id, entering)
+            rays.origin, rays.direction, rays.sigma = hits.point_ws, direction, sigma
+            rays.throughput = rays.throughput * share
+            rays.last_object = hits.object_id
+            rays = rays.pick(share.max(axis=1) > 0.0)
+        rays, hits, normal, _ = self._advance(rays, "")
+        out.signature[rays.index], out.point_ws[rays.index], out.normal_ws[rays.index] = (
+            rays.signature,
+            hits.point_ws,
+            normal,
+        )
+        out.direction_ws[rays.index], out.throughput[rays.index] = rays.direction, rays.throughput
         return out
+
+    def _advance(self, rays: _Rays, event: str) -> tuple[_Rays, Hits, FloatArray, BoolArray]:
+        """To the next hit, if it allows the event ('' = a receiver): rays left, hits, normals, whether they enter."""
+        hits = self.caster.first_hits(rays.origin, rays.direction, rays.last_object)
+        kind = np.where(hits.object_id >= 0, self._kind[hits.object_id], -1)
+        go_on = kind == SurfaceKind.DIFFUSE if event == "" else kind > SurfaceKind.DIFFUSE
+        if event == "T":
+            go_on &= kind == SurfaceKind.DIELECTRIC
+        rays, hits = rays.pick(go_on), hits.pick(go_on)
+        rays.throughput = rays.throughput * np.exp(-rays.sigma * hits.t[:, None])
+        entering = np.einsum("ij,ij->i", rays.direction, hits.geometric_ws) < 0.0
+        rays.signature = (rays.signature * HASH + 2 * hits.object_id + entering + 1) & HASH_MASK
+        return rays, hits, _facing(hits, rays.direction, entering), entering
 
     def _source_medium(self, hits: Hits, entering: BoolArray) -> FloatArray:
         """Absorption between a light inside a medium and the first interface."""

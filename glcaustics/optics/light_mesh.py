@@ -1,4 +1,4 @@
-"""The light mesh: a light's rays as a grid of triangles that carry exact flux, turned and shifted at random by a seed."""
+"""The light mesh: a light's rays as a grid of triangles of exact flux, turned and shifted at random by a seed."""
 
 from __future__ import annotations
 
@@ -53,9 +53,7 @@ class LightPatch:
         return np.asarray(solid_angle * sum(cones) / 3.0)
 
 
-def light_patches(
-    light: BeamLight, specular_ws: FloatArray, bounds_ws: FloatArray, seed: int
-) -> list[LightPatch]:
+def light_patches(light: BeamLight, specular_ws: FloatArray, bounds_ws: FloatArray, seed: int) -> list[LightPatch]:
     """Patches that together hold every direction in which the light meets a specular surface.
 
     Args:
@@ -65,7 +63,15 @@ def light_patches(
     generator = np.random.default_rng(seed)
     turn = generator.uniform(0.0, 2.0 * math.pi)
     if light.position_ws is None:
-        return [_fit(light, _turned(_frame(np.asarray(light.direction_ws, np.float64)), turn), specular_ws, bounds_ws, generator)]
+        return [
+            _fit(
+                light,
+                _turned(_frame(np.asarray(light.direction_ws, np.float64)), turn),
+                specular_ws,
+                bounds_ws,
+                generator,
+            )
+        ]
     toward = specular_ws - np.asarray(light.position_ws)
     distance = np.linalg.norm(toward, axis=1, keepdims=True)
     unit = toward / np.maximum(distance, 1e-12)

@@ -31,6 +31,16 @@ class Hits:
     geometric_ws: FloatArray
     normal_ws: FloatArray
 
+    def pick(self, chosen: BoolArray) -> Hits:
+        """Those of a mask (n,)."""
+        return Hits(
+            self.object_id[chosen],
+            self.t[chosen],
+            self.point_ws[chosen],
+            self.geometric_ws[chosen],
+            self.normal_ws[chosen],
+        )
+
 
 class RayCaster:
     """Ray queries in a BeamScene.

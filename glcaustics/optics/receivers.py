@@ -68,9 +68,7 @@ class PlaneGrid:
     def floor(half_extent_m: float, y_m: float, pixels: int, centre_xz: tuple[float, float] = (0.0, 0.0)) -> PlaneGrid:
         """A horizontal square, u along +x, v along +z, lit from above."""
         h, (x, z) = half_extent_m, centre_xz
-        return PlaneGrid(
-            (x - h, y_m, z - h), (2.0 * h, 0.0, 0.0), (0.0, 0.0, 2.0 * h), (0.0, 1.0, 0.0), pixels, pixels
-        )
+        return PlaneGrid((x - h, y_m, z - h), (2.0 * h, 0.0, 0.0), (0.0, 0.0, 2.0 * h), (0.0, 1.0, 0.0), pixels, pixels)
 
     def points_ws(self) -> FloatArray:
         """Centres of the pixels (height, width, 3)."""

@@ -31,7 +31,7 @@ MAY_IMPORT = {
     "output": BASE,
     "renderer": BASE | DATA | TECHNIQUES | {"output"},
     "bench": BASE | DATA | TECHNIQUES | {"output", "renderer", "optics", "metrics"},
-    "cli": BASE | DATA | TECHNIQUES | {"output", "renderer", "bench"},
+    "cli": BASE | DATA | TECHNIQUES | {"output", "renderer", "bench", "metrics"},
     "__init__": BASE | {"renderer", "scene"},
     "__main__": {"cli"},
 }

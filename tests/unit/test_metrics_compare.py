@@ -18,7 +18,8 @@ LDR = RANDOM.integers(30, 200, (24, 32, 3), dtype=np.uint8)
 
 
 def write(path: Path, scale: float = 1.0) -> str:
-    save_frame(path, image=LINEAR * scale, ldr=LDR, aov={"caustic_irradiance": LINEAR * scale * 2, "depth_m": LINEAR[..., 0]})  # fmt: skip
+    aov = {"caustic_irradiance": LINEAR * scale * 2, "depth_m": LINEAR[..., 0]}
+    save_frame(path, image=LINEAR * scale, ldr=LDR, aov=aov)
     return str(path)
 
 

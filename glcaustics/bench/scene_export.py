@@ -1,0 +1,163 @@
+"""From the renderer's scene to the plain arrays of the reference beams (and of others who need them)."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from glcaustics.errors import SceneError, UsageError
+from glcaustics.optics.beam_scene import BeamLight, BeamMesh, BeamScene, BeamWater, SurfaceKind, SurfaceOptics
+from glcaustics.optics.beams import HeightField
+from glcaustics.optics.receivers import PlaneGrid
+from glcaustics.scene.model import Camera, Instance, Light, LightKind, Material, OpticalKind, Scene, WaterBody
+from glcaustics.scene.water import WaveSurface, surface_of
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def beam_scene(scene: Scene, time_s: float = 0.0, *, analytic_water: bool = True) -> BeamScene:
+    """The scene at a time for `glcaustics.optics.reference`.
+
+    Args:
+        analytic_water: sums of waves as formulas instead of their meshes: the truth that a finer mesh would approach.
+            False: the meshes that the renderer and other tools get.
+    """
+    meshes = [beam_mesh(instance) for instance in scene.instances]
+    waters, notes = [], []
+    for body in scene.waters:
+        water = _analytic(body, time_s) if analytic_water else None
+        if water is not None:
+            waters.append(water)
+            continue
+        if analytic_water:
+            notes.append(f"water '{body.name}' has no formula to trace: its mesh stands for it")
+        meshes.append(beam_mesh(Instance(body.name, body.mesh_at(time_s), body.material, body.world_from_object)))
+    lights = tuple(beam_light(light) for light in scene.lights if light.shines)
+    return BeamScene(tuple(meshes), lights, tuple(waters), scene.name, tuple(notes))
+
+
+def renderer_events(scene: Scene, time_s: float = 0.0) -> int:
+    """Specular events on the longest light path that the renderer's methods follow: 2 with a solid, else 1."""
+    return 2 if any(i.optical_kind is OpticalKind.SOLID for i in scene.instances_at(time_s)) else 1
+
+
+def world_normals(instance: Instance) -> FloatArray:
+    """Unit vertex normals in world space, (V, 3) float64."""
+    linear = instance.world_from_object[:3, :3]
+    normals = instance.mesh.normals.astype(np.float64) @ np.linalg.inv(linear)
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
+
+
+def beam_mesh(instance: Instance) -> BeamMesh:
+    """One instance in world space; a mirroring transform turns its triangles round."""
+    triangles = instance.mesh.triangles.astype(np.int64)
+    if np.linalg.det(instance.world_from_object[:3, :3]) < 0.0:
+        triangles = triangles[:, ::-1]
+    return BeamMesh(
+        instance.positions_ws().astype(np.float64),
+        world_normals(instance),
+        triangles,
+        _optics(instance.optical_kind, instance.material),
+    )
+
+
+def _optics(kind: OpticalKind, material: Material) -> SurfaceOptics:
+    if kind is OpticalKind.DIFFUSE:
+        return SurfaceOptics(SurfaceKind.DIFFUSE)
+    if kind is OpticalKind.MIRROR:
+        return SurfaceOptics(SurfaceKind.MIRROR, reflectance=_three(material.base_color))
+    return SurfaceOptics(
+        SurfaceKind.DIELECTRIC, _three(material.ior_rgb()), _three(material.sigma_a), float(material.transmission)
+    )
+
+
+def _three(values: npt.ArrayLike) -> tuple[float, float, float]:
+    a, b, c = (float(v) for v in np.asarray(values, np.float64))
+    return a, b, c
+
+
+def beam_light(light: Light) -> BeamLight:
+    """Colour times intensity, and the cone of a spot."""
+    intensity = _three(np.asarray(light.color) * light.intensity)
+    if light.kind is LightKind.DIRECTIONAL:
+        return BeamLight(intensity, _three(light.direction_ws))
+    if light.kind is LightKind.POINT:
+        return BeamLight(intensity, position_ws=_three(light.position_ws))
+    return BeamLight(
+        intensity, _three(light.direction_ws), _three(light.position_ws), light.inner_cone_rad, light.outer_cone_rad
+    )
+
+
+def _analytic(body: WaterBody, time_s: float) -> BeamWater | None:
+    """The water's formula, if it is a sum of plain sine waves that lies level; else None."""
+    try:
+        surface = surface_of(body)
+    except SceneError:
+        return None
+    moved = body.world_from_object.copy()
+    moved[:3, 3] = 0.0
+    if not isinstance(surface, WaveSurface) or not np.array_equal(moved, np.eye(4)):
+        return None
+    if any(w.steepness > 0.0 for w in surface.waves):
+        return None  # a Gerstner wave's crests overhang the rectangle that its grid rests on
+    mesh = body.mesh_at(time_s)
+    x, _, z = (float(v) for v in mesh.positions_m.max(axis=0) - mesh.positions_m.min(axis=0))
+    field = HeightField(lambda x, z: surface.height(x, z, time_s), lambda x, z: surface.gradient(x, z, time_s))
+    bound = sum(abs(w.amplitude_m) for w in surface.waves)
+    key = repr((surface.waves, float(time_s))).encode()
+    return BeamWater(
+        field, _three(body.world_from_object[:3, 3]), (x, z), bound, _optics(OpticalKind.INTERFACE, body.material), key
+    )
+
+
+# Receivers
+
+
+def receiver_plane(
+    scene: Scene, name: str, size: tuple[int, int], normal_ws: tuple[float, float, float] = (0.0, 1.0, 0.0)
+) -> PlaneGrid:
+    """The outermost flat face of an instance along `normal_ws` as a grid of `size` (width, height) pixels.
+
+    A face that looks up has u along +x and v along +z.
+
+    Raises:
+        UsageError: no such instance, or it has no face that looks there.
+    """
+    instance = next((i for i in scene.instances if i.name == name), None)
+    if instance is None:
+        names = ", ".join(i.name for i in scene.instances)
+        raise UsageError(f"no instance '{name}'", where=scene.name, remedy=f"there are: {names}")
+    normal = np.asarray(normal_ws, np.float64)
+    corners = instance.positions_ws()[instance.mesh.triangles]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing = area @ normal > 0.9999 * np.linalg.norm(area, axis=1)
+    facing &= np.linalg.norm(area, axis=1) > 0.0
+    if not facing.any():
+        raise UsageError(f"instance '{name}' has no face along {normal_ws}", where=scene.name, remedy="name another")
+    height = corners[:, 0] @ normal
+    outer = facing & (height > height[facing].max() - 1e-6 * max(1.0, abs(float(height[facing].max()))))
+    u_axis = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else np.array([0.0, 0.0, 1.0])
+    v_axis = np.array([0.0, 0.0, 1.0]) if abs(normal[1]) > 0.9 else np.array([0.0, 1.0, 0.0])
+    points = corners[outer].reshape(-1, 3)
+    u, v = points @ u_axis, points @ v_axis
+    corner = u_axis * u.min() + v_axis * v.min() + normal * height[outer].mean()
+    return PlaneGrid(
+        _three(corner), _three(u_axis * np.ptp(u)), _three(v_axis * np.ptp(v)), _three(normal), size[0], size[1]
+    )
+
+
+def camera_rays(camera: Camera, size: tuple[int, int], samples: int = 1) -> tuple[FloatArray, FloatArray]:
+    """Origins and unit directions (H * samples, W * samples, 3) through even points of every pixel; row 0 on top."""
+    width, height = size[0] * samples, size[1] * samples
+    x = (2.0 * (np.arange(width) + 0.5) / width - 1.0) * size[0] / size[1]
+    y = 1.0 - 2.0 * (np.arange(height) + 0.5) / height
+    x, y = np.meshgrid(x, y)
+    pose = camera.world_from_camera.astype(np.float64)
+    rotation, eye = pose[:3, :3], pose[:3, 3]
+    if camera.orthographic:
+        offset = np.stack([x * camera.ymag_m, y * camera.ymag_m, np.zeros_like(x)], axis=-1)
+        return eye + offset @ rotation.T, np.broadcast_to(-rotation[:, 2], (*x.shape, 3)).copy()
+    tangent = np.tan(0.5 * camera.yfov_rad)
+    local = np.stack([x * tangent, y * tangent, -np.ones_like(x)], axis=-1)
+    local /= np.linalg.norm(local, axis=-1, keepdims=True)
+    return np.broadcast_to(eye, local.shape).copy(), np.asarray(local @ rotation.T)
