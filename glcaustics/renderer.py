@@ -252,6 +252,9 @@ class Renderer:
         self.quality = quality
         self.aovs = tuple(aovs)
         self.specular_view = specular_view
+        if min(self.size) < 1:
+            shown = "x".join(str(n) for n in self.size)
+            raise UsageError(f"the picture's size is {shown}", where="size", remedy="give at least 1x1 pixels")
         self._target = target
         self._present: moderngl.Framebuffer | None = None
         if target is not None and target.size != self.size:

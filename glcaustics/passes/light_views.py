@@ -160,7 +160,7 @@ def depth_range(depths: FloatArray, extent_m: float, *, positional: bool) -> tup
     matter.
     """
     lo, hi = float(np.min(depths)), float(np.max(depths))
-    air = max(0.01 * (hi - lo), 1e-3 * extent_m, 1e-30)
+    air = max(0.01 * (hi - lo), 1e-3 * extent_m, 1e-6 * abs(hi), 1e-30)  # the third: all points in one place
     if positional:
         far = max(hi, 1e-30) + air
         return max(lo - air, 2e-4 * far), far

@@ -40,7 +40,7 @@ GlcSolve glc_newton(sampler2D t_plane, GlcRasterRay ray, float facing, int max_i
         float met = f.x / (f.y < 0.0 ? f.y : -1e-30);
         vec2 off = abs(ray.start.xy + met * ray.step.xy - texel - 0.5);
         bool crosses = f.y < 0.0 && met >= 0.0 && met <= 1.0;
-        solve.error_px = max(off.x, off.y);
+        solve.error_px = crosses ? max(off.x, off.y) : 1e6;   // a ray that does not meet the plane has no distance there
         solve.iterations = i + 1;
         if (crosses && solve.error_px <= GLC_SOLVE_TOLERANCE_PX) {
             solve.u = met;

@@ -14,8 +14,9 @@ bool glc_march_settle(sampler2D t_plane, GlcRasterRay ray, float reach, inout Gl
         vec2 f = glc_raster_plane(ray, texelFetch(t_plane, ivec2(texel), 0));
         float met = f.x / (f.y < 0.0 ? f.y : -1e-30);
         vec2 off = abs(ray.start.xy + met * ray.step.xy - texel - 0.5);
-        solve.error_px = max(off.x, off.y);
-        if (f.y >= 0.0 || met < 0.0 || met > 1.0 || abs(met - solve.u) > reach) return false;
+        bool crosses = f.y < 0.0 && met >= 0.0 && met <= 1.0;
+        solve.error_px = crosses ? max(off.x, off.y) : 1e6;
+        if (!crosses || abs(met - solve.u) > reach) return false;
         if (solve.error_px <= GLC_SOLVE_TOLERANCE_PX) {
             solve.u = met;
             solve.texel = texel;
