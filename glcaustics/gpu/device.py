@@ -240,6 +240,8 @@ class Device(Resources):
         Framebuffers, viewport, scissor, program, vertex array, buffers, textures and samplers by unit, blending, depth,
         culling, colour masks, pixel store, clip control, and moderngl's own copies of them.
         """
+        if self.closed:
+            raise DeviceError("the device is closed", where=self.backend, remedy="open a new one")
         self.make_current()
         return guard_state(self.ctx, self.raw, self.info["max_texture_units"], self._resting)
 
