@@ -225,6 +225,7 @@ class Renderer:
         seed: of everything random.
         options: single options on top of the ladder, see `glcaustics methods`.
         stats: read solves back and count them.
+        shader_root: another folder of shaders than the project's own, for tests.
 
     Raises:
         UsageError, SceneError, DeviceError, ResourceLimitError: one line each.
@@ -245,6 +246,7 @@ class Renderer:
         seed: int = 0,
         options: Mapping[str, Any] | None = None,
         stats: bool = True,
+        shader_root: Path | None = None,
     ) -> None:
         self.scene = scene
         self.size = (int(size[0]), int(size[1]))
@@ -271,7 +273,7 @@ class Renderer:
         )
         self._setup.collect_stats = stats
         _aov_resources(self._setup, self.aovs, False, True)
-        self.device: Device = create_device(backend, context)
+        self.device: Device = create_device(backend, context, shader_root=shader_root)
         self.device.timing_enabled = stats
         self.announcements = [*scene.announcements, *self.device.announcements]
         self._gpu = GpuScene(self.device)
