@@ -146,7 +146,7 @@ def test_spot_light_through_water(cone: tuple[float, float]) -> None:
     light = spot(*cone)
     pixels, half = 160, 1.2
     scene = scene_of([plane("floor", 2.0, -1.0), sheet("water", 1.5, 0.0)], [light], from_above(half, -1.0))
-    frame = shoot(scene, (pixels, pixels), quality="high", options=NO_REFLECTION)
+    frame = shoot(scene, (pixels, pixels), options=NO_REFLECTION)
     value = frame.aov["caustic_irradiance"][..., 1].astype(np.float64)
     outer, inner = math.cos(light.outer_cone_rad), math.cos(light.inner_cone_rad)
 

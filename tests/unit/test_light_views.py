@@ -175,13 +175,8 @@ def test_sizes_keep_their_area_and_their_limits(aspect: float) -> None:
 
 @pytest.mark.parametrize("positional", [False, True])
 def test_depth_ranges_are_never_empty(positional: bool) -> None:
-    for depths, extent in (
-        ((1.0, 2.0), 1.0),
-        ((3.0, 3.0), 0.0),
-        ((0.0, 0.0), 0.0),
-        ((1e-7, 1e-7), 0.0),
-        ((1e9, 1e9), 1.0),
-    ):
+    cases = ((1.0, 2.0, 1.0), (3.0, 3.0, 0.0), (0.0, 0.0, 0.0), (1e-7, 1e-7, 0.0), (1e9, 1e9, 1.0))
+    for low, high, extent in cases:
         near, far = depth_range(np.array([low, high]), extent, positional=positional)
         assert near < far and high <= far
         assert near > 0.0 if positional else near <= low
