@@ -6,7 +6,7 @@ Boat space, metres: +x towards the bow, +y up, the keel's lowest line at y = 0, 
 from __future__ import annotations
 
 import numpy as np
-from procedural import board, joined, placed, rotation_y, rotation_z, tube
+from procedural_parts import board, joined, placed, rotation_y, rotation_z, tube
 
 LENGTH, STATIONS, STRAKES = 3.2, 26, 6
 

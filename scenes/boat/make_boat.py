@@ -15,29 +15,24 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 from hull import clinker_boat  # noqa: E402
-from procedural import (  # noqa: E402
+from procedural import save_jpg, save_png, write_glb  # noqa: E402
+from procedural_fields import fractal2, noise2, pebbles, periodic, scatter, step  # noqa: E402
+from procedural_parts import (  # noqa: E402
     boulder,
-    fractal2,
     grid_part,
     joined,
-    noise2,
+    matrix,
     placed,
     rotation_x,
     rotation_y,
     rotation_z,
-    save_jpg,
-    save_png,
     tube,
-    write_glb,
+    tuft,
+    upward,
 )
 
 X_M, Z_M = (-6.8, 5.8), (-5.6, 3.9)  # the bed's rectangle
 BOAT_AT, BOAT_YAW, BOAT_PITCH, BOAT_ROLL = (0.15, -0.40, -0.75), 154.0, 12.0, 9.0
-
-
-def step(low, high, x):
-    t = np.clip((x - low) / (high - low), 0.0, 1.0)
-    return t * t * (3.0 - 2.0 * t)
 
 
 def bed_height(x, z):
@@ -47,35 +42,6 @@ def bed_height(x, z):
     bank = step(edge + 0.35, edge - 1.5, z)
     ripples = 0.012 * np.sin(9.0 * x + 5.0 * z + 3.0 * noise2(x, z, 0.8, 5))
     return -0.93 + 1.2 * bumps * (1.0 - 0.6 * bank) + ripples + 1.55 * bank + 0.5 * step(-3.6, -5.6, z)
-
-
-def ribbon(random, length, width, bend, lean, rows):
-    """A blade from the origin upwards: (positions, normals, uv, triangles), bent over towards `lean` (radians)."""
-    t = np.linspace(0.0, 1.0, rows)
-    sway = 0.045 * length * np.sin(2.0 * np.pi * (t * random.uniform(0.6, 1.3) + random.random())) * t
-    out = bend * length * t**1.8 + sway
-    height = length * (t - 0.28 * bend * t**2.5)
-    twist = random.uniform(0.0, np.pi) + random.uniform(-1.2, 1.2) * t
-    half = 0.5 * width * (1.0 - 0.85 * t**4)
-    centre = np.stack([np.cos(lean) * out, height, np.sin(lean) * out], axis=-1)
-    side = np.stack([np.cos(twist), 0.0 * t, np.sin(twist)], axis=-1) * half[:, None]
-    u = np.broadcast_to((random.integers(0, 4) + np.array([0.06, 0.94])) / 4.0, (rows, 2))
-    return grid_part(
-        np.stack([centre - side, centre + side], axis=1), np.stack([u, np.repeat(1 - t[:, None], 2, 1)], axis=-1)
-    )
-
-
-def tuft(seed, count, radius, lengths, widths, bend, rows, root=-0.14):
-    """Many blades around the origin, taller in the middle."""
-    random = np.random.default_rng(seed)
-    blades = []
-    for _ in range(count):
-        r, a = radius * np.sqrt(random.random()), random.uniform(0, 2 * np.pi)
-        tall = random.uniform(*lengths) * (1.0 - 0.35 * (r / radius) ** 2)
-        lean = 0.5 + random.normal() * 0.9
-        blade = ribbon(random, tall - root, random.uniform(*widths), random.uniform(*bend), lean, rows)
-        blades.append(placed(blade, shift=(r * np.cos(a), root, r * np.sin(a))))
-    return joined(blades)
 
 
 def lily_pads(seed, spots):
@@ -110,19 +76,6 @@ def flower(random):
     return joined(petals)
 
 
-def upward(part):
-    """The part with its front on top."""
-    positions, normals, uv, triangles = part
-    return (positions, -normals, uv, triangles[:, ::-1]) if normals[:, 1].mean() < 0.0 else part
-
-
-def matrix(x, y, z, turn=0.0, scale=1.0, tilt=0.0):
-    out = np.eye(4)
-    out[:3, :3] = rotation_y(turn) @ rotation_x(tilt) * scale
-    out[:3, 3] = x, y, z
-    return out
-
-
 def boat_frame():
     """World from boat: (rotation, shift)."""
     return rotation_y(BOAT_YAW) @ rotation_x(BOAT_ROLL) @ rotation_z(BOAT_PITCH), np.array(BOAT_AT)
@@ -132,17 +85,6 @@ def in_boat(x, z, margin):
     rotate, shift = boat_frame()
     p = (np.array([x, BOAT_AT[1], z]) - shift) @ rotate
     return abs(p[0]) < 1.65 + margin and abs(p[2]) < 0.62 + margin
-
-
-def scatter(seed, count, box, gap, accept):
-    """Up to `count` random places (x, z) in a box, no two nearer than `gap`."""
-    random = np.random.default_rng(seed)
-    found: list[tuple[float, float]] = []
-    for _ in range(6000):
-        x, z = random.uniform(*box[0]), random.uniform(*box[1])
-        if len(found) < count and accept(x, z) and all(np.hypot(x - a, z - b) > gap for a, b in found):
-            found.append((x, z))
-    return found
 
 
 def make_plants():
@@ -207,24 +149,6 @@ def make_boat():
     y = np.linspace(foot, 0.62, 14)
     lean = np.stack([post[0] + 0.02 * np.sin(3 * y), y, post[2] + 0.03 * (y - 0.42)], axis=-1)
     write_glb(HERE / "post.glb", {"post": tube(lean, np.full(14, 0.062), 16)})
-
-
-def pebbles(x, z, cell, seed, share):
-    """Round stones on a jittered lattice: (cover in [0, 1], stone number, height in [0, 1])."""
-    random = np.random.default_rng(seed)
-    jitter, size = random.uniform(0.15, 0.85, (2, 64, 64)), random.uniform(0.15, 0.48, (64, 64))
-    size[random.random((64, 64)) > share] = 0.0
-    i, j = np.floor(x / cell).astype(int), np.floor(z / cell).astype(int)
-    best, owner = np.full(x.shape, -1.0), np.zeros(x.shape, int)
-    for di in (-1, 0, 1):
-        for dj in (-1, 0, 1):
-            a, b = (i + di) % 64, (j + dj) % 64
-            dx, dz = x / cell - (i + di + jitter[0][a, b]), z / cell - (j + dj + jitter[1][a, b])
-            squash = 1.0 + 0.5 * jitter[0][a, b]
-            inside = 1.0 - np.hypot(dx * squash, dz) / np.maximum(size[a, b], 1e-3)
-            owner = np.where(inside > best, a * 64 + b, owner)
-            best = np.maximum(best, inside)
-    return np.clip(best / 0.12, 0.0, 1.0), owner, np.sqrt(np.clip(best, 0.0, 1.0))
 
 
 def make_bed(width=2048):
@@ -294,6 +218,14 @@ def make_wood():
     save_png(HERE / "paint.png", coat * (1.0 - worn) + wood * 0.9 * worn, 48)
 
 
+def make_stone_texture():
+    """stone.png: grey granite with lichen; repeats."""
+    grain, patch = periodic(512, 90, 21, 0.02)[..., None], periodic(512, 9, 22)[..., None]
+    color = np.array([0.52, 0.50, 0.47]) * (1.0 + 0.22 * grain + 0.18 * patch)
+    lichen = np.clip((patch + 0.4 * grain - 0.28) / 0.15, 0.0, 1.0)
+    save_png(HERE / "stone.png", color * (1.0 - 0.6 * lichen) + 0.6 * lichen * np.array([0.50, 0.50, 0.36]), 48)
+
+
 if __name__ == "__main__":
     make_bed()
     make_plants()
@@ -301,3 +233,4 @@ if __name__ == "__main__":
     make_boat()
     make_leaf_textures()
     make_wood()
+    make_stone_texture()

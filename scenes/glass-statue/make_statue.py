@@ -1,4 +1,4 @@
-"""Makes statue.ply, wall.glb, wall.png and floor.png: a glass figure on a lotus, a wall of coloured stones, an inlaid floor.
+"""Makes statue.ply (a glass figure on a lotus), wall.glb and wall.jpg (coloured stones), floor.png (inlaid tiles).
 
     python scenes/glass-statue/make_statue.py
 
@@ -18,8 +18,6 @@ sys.path.insert(0, str(HERE.parent))
 from procedural import (  # noqa: E402
     capsule,
     ellipsoid,
-    fractal2,
-    grid_part,
     polygonise,
     save_jpg,
     save_png,
@@ -28,6 +26,8 @@ from procedural import (  # noqa: E402
     write_glb,
     write_ply,
 )
+from procedural_fields import fractal2  # noqa: E402
+from procedural_parts import grid_part  # noqa: E402
 
 CELLS_ALONG_HEIGHT = 102
 HEIGHT_M = 0.5
