@@ -39,8 +39,7 @@ def cone_falloff(cosine: np.ndarray, light: Light) -> np.ndarray:
     return np.clip((cosine - outer) / (inner - outer), 0.0, 1.0) ** 2
 
 
-@pytest.mark.smoke
-@pytest.mark.parametrize("theta", [0.0, 30.0, 75.0])
+@pytest.mark.parametrize("theta", [0.0, pytest.param(30.0, marks=pytest.mark.smoke), 75.0])
 def test_directional_light(theta: float) -> None:
     image = direct(scene_of([plane("floor", 3.0)], [sun(theta, 5.0)], from_above(HALF)))
     np.testing.assert_allclose(image, 5.0 * math.cos(math.radians(theta)), rtol=1e-4)
@@ -134,7 +133,7 @@ def test_no_acne_on_a_lit_plane_and_ball(theta: float, scale: float) -> None:
         np.testing.assert_allclose(value[where], cosine[where], atol=0.01)
 
 
-@pytest.mark.parametrize("scale", [1.0, 0.001, 1000.0])
+@pytest.mark.parametrize("scale", [pytest.param(1.0, marks=pytest.mark.smoke), 0.001, 1000.0])
 @pytest.mark.parametrize("kind", ["directional", "point"])
 def test_no_light_leaks_under_a_box(kind: str, scale: float) -> None:
     """A box stands on the floor: right behind its base the floor is dark, as close as the picture resolves."""

@@ -28,9 +28,8 @@ def eye_at(theta_deg: float, distance_m: float = 3.0) -> Camera:
     return Camera.look_at(eye, (0.0, 0.0, 0.0), orthographic=True, ymag_m=1.0)
 
 
-@pytest.mark.smoke
 @pytest.mark.parametrize("absorbing", [False, True])
-@pytest.mark.parametrize("theta", [0.0, 40.0, 65.0])
+@pytest.mark.parametrize("theta", [0.0, pytest.param(40.0, marks=pytest.mark.smoke), 65.0])
 def test_floor_under_flat_water(theta: float, absorbing: bool) -> None:
     """L = T(eye) rho E / (pi n^2) exp(-sigma d / cos t'), E = E_perp T(light) exp(-sigma d) (methods.md, section 1)."""
     depth = 0.4
