@@ -136,15 +136,15 @@ class Device(Resources):
 
     def draw_fullscreen(
         self, program: Program, fbo: moderngl.Framebuffer, *, blend: str | None = None,
-        viewport: tuple[int, int, int, int] | None = None, depth_func: str | None = None,
+        viewport: tuple[int, int, int, int] | None = None, depth_func: str | None = None, depth_write: bool = False,
     ) -> None:  # fmt: skip
         """One triangle over the framebuffer (or a part of it): no depth test, no culling, no blending unless asked.
 
-        Depth is never written; `depth_func` tests it, so that a depth buffer can mask pixels out.
+        `depth_func` tests depth, so that a depth buffer can mask pixels out; `depth_write` writes such a mask.
         """
         array = self._no_buffers(program)
         self.draw(
-            array, program, fbo, vertices=3, blend=blend, viewport=viewport, depth_func=depth_func, depth_write=False
+            array, program, fbo, vertices=3, blend=blend, viewport=viewport, depth_func=depth_func, depth_write=depth_write
         )
 
     def draw_points(

@@ -28,5 +28,4 @@ def raster_uniforms(camera: CameraState, size: tuple[int, int]) -> dict[str, Any
     return {
         "u_raster_from_world": raster_from_world(camera, size),
         "u_raster_size": (float(size[0]), float(size[1])),
-        "u_raster_orthographic": camera.orthographic,
     }

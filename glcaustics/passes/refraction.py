@@ -1,12 +1,15 @@
-"""What the eye sees through water and glass and in mirrors: the specular layer composed over the shaded opaque layer."""
+"""What the eye sees through water and glass and in mirrors: the specular layer over the shaded opaque layer."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from glcaustics.errors import UsageError
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes.frame import FrameSetup, PassContext
+from glcaustics.passes.geometry import KIND_INDEX, SPECULAR_KINDS
 from glcaustics.passes.lighting import sky_uniforms
 from glcaustics.passes.raster import raster_uniforms
 from glcaustics.scene.model import OpticalKind
@@ -26,7 +29,7 @@ OUTPUTS = {
     "STATUS": "view.solve_status",
     "SOLVE": "view.solve",
 }
-UNSOLVED = "view.unsolved"
+TODO = "view.todo_depth"
 
 
 def check_solver(name: object) -> None:
@@ -48,7 +51,7 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
                 "view.caustic_irradiance": TextureDesc("rgba32f", setup.size, "lux"),
                 "view.solve_status": TextureDesc("r32f", setup.size),
                 "view.solve": TextureDesc("rgba32f", setup.size),
-                **({UNSOLVED: TextureDesc("r8", setup.size)} if cascade else {}),
+                **({TODO: TextureDesc("depth24", setup.size)} if cascade else {}),
             },
             _execute,
             reads=(
@@ -58,7 +61,7 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
                 *(("specular.plane", "specular.back_plane", "specular.back_normal_ws") if solids else ()),
             ),
             optional=("caustics.irradiance",),
-            always_writes=(UNSOLVED,) if cascade else (),
+            always_writes=("view.radiance", TODO) if cascade else (),
             note=f"what water, glass and mirrors show; eye rays: {SOLVERS[solver]}",
         )
     )
@@ -67,33 +70,35 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
 def _execute(ctx: PassContext) -> None:
     solver = str(ctx.setup.options["refraction"])
     device = ctx.device
-    names = tuple(OUTPUTS.values())
-    locations = ctx.locations(**OUTPUTS)
-    plain = ctx.target(*names, depth="specular.depth")
-    base = {**locations, "HAS_UNSOLVED": 0}
+    outputs = ctx.locations(**OUTPUTS)
+    target = ctx.target(*OUTPUTS.values(), depth="specular.depth")
     with device.timer("refraction/opaque"):
-        program = device.program("passes/refraction/opaque", base)
+        program = device.program("passes/refraction/opaque", outputs)
         program.set_all(_textures(ctx))
-        device.draw_fullscreen(program, plain, depth_func="<=")
-    if solver != "cascade":
-        stage = {"NEWTON": int(solver == "newton"), "MARCH": _MARCH[solver], "SOUSA": int(solver == "sousa")}
-        with device.timer(f"refraction/{solver}"):
-            device.draw_fullscreen(_program(ctx, base, **stage, FINAL=1), plain, depth_func=">")
-        return
-    first = {**locations, "HAS_UNSOLVED": 1, "LOCATION_UNSOLVED": sum(locations[f"HAS_{k}"] for k in OUTPUTS)}
-    with device.timer("refraction/newton"):
-        target = ctx.target(*names, UNSOLVED, depth="specular.depth")
-        device.draw_fullscreen(_program(ctx, first, NEWTON=1, MARCH=0, SOUSA=0, FINAL=0), target, depth_func=">")
+        device.draw_fullscreen(program, target, depth_func="<=")
+    with device.timer("refraction/first"):
+        stage = {"NEWTON": int(solver in ("cascade", "newton")), "MARCH": 0 if solver == "cascade" else _MARCH[solver]}
+        program = _program(ctx, outputs, **stage, SOUSA=int(solver == "sousa"), FINAL=int(solver != "cascade"))
+        device.draw_fullscreen(program.set(u_mask_depth=1.0), target, depth_func=">")
+    if solver == "cascade":
+        _finish(ctx, outputs)
+
+
+def _finish(ctx: PassContext, outputs: dict[str, int]) -> None:
+    """What Newton left to do. A depth mask skips the other pixels before any shader runs: 1 all, 0.5 the reflection."""
+    device = ctx.device
+    with device.timer("refraction/mask"):
+        program = device.program("passes/refraction/todo").set(t_radiance=ctx.texture("view.radiance"))
+        device.draw_fullscreen(program, ctx.target(depth=TODO), depth_func="1", depth_write=True)
     with device.timer("refraction/marching"):
-        program = _program(ctx, base, NEWTON=1, MARCH=_MARCH[solver], SOUSA=0, FINAL=1, RETRY=1)
-        device.draw_fullscreen(program, plain, depth_func=">")
-    if not ctx.live("view.radiance"):
-        return
+        program = _program(ctx, outputs, NEWTON=1, MARCH=_MARCH["cascade"], SOUSA=0, FINAL=1, RETRY=1)
+        target = ctx.target(*OUTPUTS.values(), depth=TODO)
+        device.draw_fullscreen(program.set(u_mask_depth=0.75), target, depth_func="<=")
     with device.timer("refraction/reflection"):
-        alone = {**{f"HAS_{name}": 0 for name in OUTPUTS}, "HAS_RADIANCE": 1, "LOCATION_RADIANCE": 0, "HAS_UNSOLVED": 0}
-        program = _program(ctx, alone, NEWTON=0, MARCH=_MARCH[solver], SOUSA=0, FINAL=1, RETRY=1, REFLECTION=1)
-        target = ctx.target("view.radiance", depth="specular.depth")
-        device.draw_fullscreen(program, target, depth_func=">", blend="add")
+        alone = {f"HAS_{name}": 0 for name in OUTPUTS} | {"HAS_RADIANCE": 1, "LOCATION_RADIANCE": 0}
+        program = _program(ctx, alone, NEWTON=0, MARCH=_MARCH["cascade"], SOUSA=0, FINAL=1, REFLECTION=1)
+        target = ctx.target("view.radiance", depth=TODO)
+        device.draw_fullscreen(program.set(u_mask_depth=0.25), target, depth_func="<=", blend="add")
 
 
 def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
@@ -108,9 +113,15 @@ def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
         "USE_MARCH": stage["MARCH"],
         "USE_SOUSA": stage["SOUSA"],
         "HAS_SOLID": int(OpticalKind.SOLID in kinds),
+        "ORTHOGRAPHIC": int(ctx.frame.camera.orthographic),
         "HAS_MIRROR": int(OpticalKind.MIRROR in kinds),
     }
+    specular = [item for item in ctx.frame.gpu.items if item.kind in SPECULAR_KINDS]
+    one = specular[0].instance.material if len(specular) == 1 and specular[0].kind is not OpticalKind.MIRROR else None
+    defines["ONE_OBJECT"] = KIND_INDEX[specular[0].kind] if one is not None else 0
     program = ctx.device.program("passes/refraction/refraction", defines)
+    if one is not None:
+        program.set(u_one_ior=one.ior_rgb(), u_one_sigma_a=one.sigma_a, u_one_transmission=one.transmission)
     low, high = ctx.setup.scene_bounds_ws
     options = ctx.setup.options
     program.set_all(
@@ -121,10 +132,10 @@ def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
             **_textures(ctx),
             "u_bounds_min_ws": tuple(low),
             "u_bounds_max_ws": tuple(high),
+            "u_bounds_diagonal_m": float(np.linalg.norm(high - low)),
             "u_refraction_iterations": int(options["refraction_iterations"]),
             "u_refraction_steps": int(options["refraction_steps"]),
             "u_reflection_steps": int(options["reflection_steps"]),
-            **({"t_unsolved": ctx.texture(UNSOLVED)} if stage.get("RETRY") else {}),
         }
     )
     return program

@@ -27,42 +27,34 @@ struct GlcSolve {
 const float GLC_SOLVE_TOLERANCE_PX = 1.0;
 
 // t_plane: rgba32f planes. facing: 1 for surfaces that the ray enters from the eye's side, -1 for those it leaves towards it.
+// The loop holds one break and no other branch: what failed is told apart after it.
 GlcSolve glc_newton(sampler2D t_plane, GlcRasterRay ray, float facing, int max_iterations) {
     GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_DIVERGED, 0);
-    float u = 0.0, behind = 1.0;
     vec2 last = vec2(textureSize(t_plane, 0)) - 1.0;
-    float extent = max(max(abs(ray.step.x), abs(ray.step.y)), 1e-6);
-    bool at_edge = false;
+    float u = 0.0, front = 0.0, behind = 1.0;
+    bool hit = false;
     for (int i = 0; i < max_iterations; ++i) {
-        vec2 px = ray.start.xy + u * ray.step.xy;
-        vec2 texel = clamp(floor(px), vec2(0.0), last);
+        vec2 texel = clamp(floor(ray.start.xy + u * ray.step.xy), vec2(0.0), last);
         vec2 f = facing * glc_raster_plane(ray, texelFetch(t_plane, ivec2(texel), 0));
-        float met = f.x / (f.y < 0.0 ? f.y : -1e-30);
+        float met = f.y < 0.0 ? f.x / f.y : -1.0;
         vec2 off = abs(ray.start.xy + met * ray.step.xy - texel - 0.5);
-        bool crosses = f.y < 0.0 && met >= 0.0 && met <= 1.0;
-        solve.error_px = crosses ? max(off.x, off.y) : 1e6;   // a ray that does not meet the plane has no distance there
+        // A ray that does not meet the plane has no distance there.
+        solve.error_px = met >= 0.0 && met <= 1.0 ? max(off.x, off.y) : 1e6;
         solve.iterations = i + 1;
-        if (crosses && solve.error_px <= GLC_SOLVE_TOLERANCE_PX) {
-            solve.u = met;
-            solve.texel = texel;
-            solve.status = GLC_SOLVE_HIT;
-            break;
-        }
-        if (u * f.y - f.x >= 0.0) solve.u_front = max(solve.u_front, u); else behind = min(behind, u);
-        if (at_edge && crosses && met >= ray.u_screen) {
-            solve.u = met;
-            solve.status = GLC_SOLVE_OFFSCREEN;
-            break;
-        }
-        bool inside = crosses && met > solve.u_front - 1e-6 && met < behind + 1e-6;
-        u = inside ? met : 0.5 * (solve.u_front + behind);
-        at_edge = u >= ray.u_screen;
-        u = min(u, ray.u_screen);
-        solve.u = u;
-        if ((behind - solve.u_front) * extent < 1.0) {
-            solve.status = GLC_SOLVE_DISCONTINUITY;
-            break;
-        }
+        solve.texel = texel;
+        hit = solve.error_px <= GLC_SOLVE_TOLERANCE_PX;
+        bool before = u * f.y >= f.x;
+        front = before ? u : front;
+        behind = before ? behind : u;
+        u = hit || (met > front - 1e-6 && met < behind + 1e-6) ? met : 0.5 * (front + behind);
+        u = hit ? u : min(u, ray.u_screen);
+        if (hit) break;
     }
+    solve.u = u;
+    solve.u_front = front;
+    float extent = max(abs(ray.step.x), abs(ray.step.y));
+    if (hit) solve.status = GLC_SOLVE_HIT;
+    else if (u >= ray.u_screen && ray.u_screen < 1.0) solve.status = GLC_SOLVE_OFFSCREEN;
+    else if ((behind - front) * extent < 1.0) solve.status = GLC_SOLVE_DISCONTINUITY;
     return solve;
 }

@@ -12,21 +12,26 @@ struct GlcRasterRay {
     float u_screen;    // where the ray leaves the picture, in [0, 1]
 };
 
+// From a pixel with affine depth s, start = (px, s) and w its homogeneous w (depth in metres; 1 when orthographic).
 // raster_from_world: rows give X, Y, S, W of a world point with px = XY / W, s = S / W (see `Raster` in passes/raster.py).
-GlcRasterRay glc_raster_ray(mat4 raster_from_world, vec2 size, vec3 origin_ws, vec3 d_ws, float length_m) {
-    vec4 q = raster_from_world * vec4(origin_ws, 1.0);
+GlcRasterRay glc_raster_ray_from(mat4 raster_from_world, vec2 size, vec3 start, float w, vec3 d_ws, float length_m) {
     vec4 dq = raster_from_world * vec4(d_ws, 0.0);
     // Towards the eye the ray ends before the eye's plane, where raster space has no end.
-    if (q.w + length_m * dq.w < 0.02 * q.w) length_m = -0.98 * q.w / dq.w;
+    if (w + length_m * dq.w < 0.02 * w) length_m = -0.98 * w / dq.w;
     GlcRasterRay ray;
     ray.length_m = length_m;
-    ray.w = vec2(q.w, q.w + length_m * dq.w);
-    ray.start = q.xyz / q.w;
+    ray.w = vec2(w, w + length_m * dq.w);
+    ray.start = start;
     ray.step = length_m * (dq.xyz - ray.start * dq.w) / ray.w.y;
     vec2 room = mix(ray.start.xy, size - ray.start.xy, greaterThan(ray.step.xy, vec2(0.0)));
     vec2 leaves = room / max(abs(ray.step.xy), vec2(1e-6));
     ray.u_screen = clamp(min(leaves.x, leaves.y), 0.0, 1.0);
     return ray;
+}
+
+GlcRasterRay glc_raster_ray(mat4 raster_from_world, vec2 size, vec3 origin_ws, vec3 d_ws, float length_m) {
+    vec4 q = raster_from_world * vec4(origin_ws, 1.0);
+    return glc_raster_ray_from(raster_from_world, size, q.xyz / q.w, q.w, d_ws, length_m);
 }
 
 // Metres along the ray at u.

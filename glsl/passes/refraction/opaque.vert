@@ -1,4 +1,4 @@
-// One triangle over the picture on the far plane: the specular layer's depth buffer masks the pixels (empty ones hold 1).
+// One triangle over the picture at the depth of empty pixels in the specular layer's depth buffer.
 out vec2 v_uv;
 
 void main() {

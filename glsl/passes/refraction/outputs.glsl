@@ -11,12 +11,11 @@ layout(location = LOCATION_STATUS) out float o_status;           // GLC_VIEW_*
 #if HAS_SOLVE
 layout(location = LOCATION_SOLVE) out vec4 o_solve;              // uv of the hit, error in pixels, texel look-ups
 #endif
-#if HAS_UNSOLVED
-layout(location = LOCATION_UNSOLVED) out float o_unsolved;       // GLC_TODO_* / 255: what later stages must finish
-#endif
 
-#define GLC_TODO_REFRACTION 1
-#define GLC_TODO_REFLECTION 2
+// What later stages must finish, kept in the radiance's alpha: also the mask's depth (todo.frag).
+#define GLC_TODO_NOTHING 0.0
+#define GLC_TODO_REFLECTION 0.5
+#define GLC_TODO_ALL 1.0
 
 // The way each pixel went; renderer.AOVS documents the same numbers.
 #define GLC_VIEW_OPAQUE 0.0
@@ -38,9 +37,9 @@ struct Seen {
     float status;
 };
 
-void write_view(Seen seen, int todo) {
+void write_view(Seen seen, float todo) {
 #if HAS_RADIANCE
-    o_radiance = vec4(seen.radiance, 1.0);
+    o_radiance = vec4(seen.radiance, todo);
 #endif
 #if HAS_CAUSTICS_VIEW
     o_caustics = vec4(seen.caustics, 1.0);
@@ -50,8 +49,5 @@ void write_view(Seen seen, int todo) {
 #endif
 #if HAS_SOLVE
     o_solve = vec4(seen.uv, seen.error_px, seen.iterations);
-#endif
-#if HAS_UNSOLVED
-    o_unsolved = float(todo) / 255.0;
 #endif
 }

@@ -1,7 +1,7 @@
 // What water, glass and mirrors show: the camera's specular layer over the shaded opaque layer. Exact Fresnel, Beer-Lambert
 // absorption and the radiance scale (n_from/n_to)^2 at every interface that the eye ray crosses (pbrt-v4, sec. 9.5.2). Rays are
-// followed in screen space, see trace.glsl. RETRY: only the pixels that the
-// first stage left to do; REFLECTION: then what mirrors in them, as a difference to the sky that the first stage put there.
+// followed in screen space, see trace.glsl. The first stage leaves pixels to do
+// (FINAL 0): reflections that count (REFLECTION: added as the difference to the sky that it put there), and unsolved ones, done anew.
 #include "common/optics.glsl"
 #include "interface/camera.glsl"
 #include "interface/objects.glsl"
@@ -12,30 +12,36 @@
 
 uniform sampler2D t_specular_depth_m;
 uniform sampler2D t_specular_normal;
-#if RETRY
-uniform sampler2D t_unsolved;
+
+#if ONE_OBJECT
+// A scene with one specular object, of this kind: its material without a fetch.
+uniform vec3 u_one_ior;
+uniform vec3 u_one_sigma_a;
+uniform float u_one_transmission;
 #endif
 
 in vec2 v_uv;
+in vec3 v_ray_ws;
 
 // Shares of the reflection below which the sky stands for what a march would find, faded in between.
-const float REFLECT_FROM = 0.05, REFLECT_TO = 0.12;
-
-float reflection_weight(float share) {
-    return smoothstep(REFLECT_FROM, REFLECT_TO, share);
-}
+const float REFLECT_FROM = 0.07, REFLECT_TO = 0.16;
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-#if RETRY
-    int todo = int(texelFetch(t_unsolved, pixel, 0).r * 255.0 + 0.5);
-    if ((todo & (REFLECTION == 1 ? GLC_TODO_REFLECTION : GLC_TODO_REFRACTION)) == 0) discard;
-#endif
     float depth_m = texelFetch(t_specular_depth_m, pixel, 0).r;
     vec4 stored = texelFetch(t_specular_normal, pixel, 0);
+#if ONE_OBJECT
+    GlcObject object = GlcObject(vec3(1.0), ONE_OBJECT, u_one_ior, 0.0, u_one_sigma_a, u_one_transmission);
+#else
     GlcObject object = glc_object(int(abs(stored.w) + 0.5) - 1);
+#endif
+#if ORTHOGRAPHIC
     vec3 p = glc_camera_position_ws(v_uv, depth_m);
     vec3 v = glc_camera_ray_ws(v_uv);
+#else
+    vec3 p = u_world_from_camera[3].xyz + depth_m * v_ray_ws;
+    vec3 v = normalize(v_ray_ws);
+#endif
     vec3 n = stored.xyz;
     // A shading normal that leans away from the eye would reflect into the surface: bring it back to grazing.
     float cos_i = -dot(n, v);
@@ -43,9 +49,13 @@ void main() {
 
 #if HAS_MIRROR
     if (object.kind == GLC_MIRROR) {
+#if REFLECTION
+        write_view(Seen(vec3(0.0), vec3(0.0), 0.0, v_uv, 0.0, 0.0, GLC_VIEW_OPAQUE), GLC_TODO_NOTHING);   // done already
+        return;
+#endif
         Seen mirror = look_along(p, reflect(v, n));
         mirror.radiance *= glc_fresnel_metal(object.base_color, cos_i);
-        write_view(mirror, GLC_TODO_REFRACTION);
+        write_view(mirror, GLC_TODO_ALL);
         return;
     }
 #endif
@@ -54,16 +64,17 @@ void main() {
     float share = glc_fresnel_dielectric(cos_i, eta);
     vec3 reflected = reflect(v, n);
     vec3 reflection = share * glc_sky_radiance(reflected);
-    vec3 held = from_dense ? glc_transmittance(object.sigma_a, length(p - u_world_from_camera[3].xyz)) : vec3(1.0);
-#if USE_MARCH && (REFLECTION || !RETRY)
+    // Absorption: under water from the eye to the surface, over it along the refracted ray; solids count their own way.
+    float absorbing_m = from_dense ? length(p - u_world_from_camera[3].xyz) : 0.0;
+#if USE_MARCH && !RETRY
     {
         Seen seen = look_along(p, reflected);
         if (from_dense) seen.radiance *= glc_transmittance(object.sigma_a, seen.distance_m);
-        vec3 marched = mix(reflection, share * seen.radiance, reflection_weight(share));
+        vec3 marched = mix(reflection, share * seen.radiance, smoothstep(REFLECT_FROM, REFLECT_TO, share));
 #if REFLECTION
-        // Added to what the stages before wrote with the sky in the mirror.
-        seen.radiance = held * (marched - reflection);
-        write_view(seen, 0);
+        // Added to what the first stage wrote with the sky in the mirror.
+        seen.radiance = glc_transmittance(object.sigma_a, absorbing_m) * (marched - reflection);
+        write_view(seen, GLC_TODO_NOTHING);
         return;
 #endif
         reflection = marched;
@@ -73,21 +84,35 @@ void main() {
     vec3 d;
     bool solved = true;
     Seen through = Seen(vec3(0.0), vec3(0.0), 0.0, v_uv, 0.0, 0.0, GLC_VIEW_TIR);
-    vec3 radiance = reflection;
+    vec3 refraction = vec3(0.0);
     if (glc_refract(v, n, eta, d)) {
         vec3 tint = vec3((1.0 - share) * object.transmission);
+        GlcRasterRay ray;
         bool leaves = true;
 #if HAS_SOLID
-        if (object.kind == GLC_SOLID) leaves = solid_through(p, d, object.ior.g, object.sigma_a, tint);
-        else
+        if (object.kind == GLC_SOLID) {
+            leaves = solid_through(p, d, object.ior.g, object.sigma_a, tint);
+            ray = eye_ray(p, d);
+        } else
 #endif
-        tint /= eta * eta;   // radiance behind the interface is larger by (n_behind / n_eye)^2
-        through = look_through(p, d, solved);
-        if (object.kind == GLC_INTERFACE && !from_dense) tint *= glc_transmittance(object.sigma_a, through.distance_m);
+        {
+            tint /= eta * eta;   // radiance behind the interface is larger by (n_behind / n_eye)^2
+            float w = ORTHOGRAPHIC == 1 ? 1.0 : depth_m;
+            vec3 start = vec3(gl_FragCoord.xy, ORTHOGRAPHIC == 1 ? -depth_m : 1.0 / depth_m);
+#if FINAL
+            float room = glc_box_exit(p, d, u_bounds_min_ws, u_bounds_max_ws);
+#else
+            float room = u_bounds_diagonal_m;   // long enough; where the scene ends matters to the final stage alone
+#endif
+            ray = glc_raster_ray_from(u_raster_from_world, u_raster_size, start, w, d, room);
+        }
+        through = look_through(ray, p, d, solved);
+        if (object.kind == GLC_INTERFACE && !from_dense) absorbing_m = through.distance_m;
         if (!leaves) through.status = GLC_VIEW_TIR;
-        radiance += tint * through.radiance;
+        refraction = tint * through.radiance;
     }
-    through.radiance = held * radiance;
-    write_view(through, (solved ? 0 : GLC_TODO_REFRACTION) | (share > REFLECT_FROM ? GLC_TODO_REFLECTION : 0));
+    vec3 held = object.kind == GLC_INTERFACE ? glc_transmittance(object.sigma_a, absorbing_m) : vec3(1.0);
+    through.radiance = from_dense ? held * (reflection + refraction) : reflection + held * refraction;
+    write_view(through, solved ? (share > REFLECT_FROM ? GLC_TODO_REFLECTION : GLC_TODO_NOTHING) : GLC_TODO_ALL);
 #endif
 }

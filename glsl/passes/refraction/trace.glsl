@@ -20,6 +20,7 @@ uniform sampler2D t_caustics;
 #endif
 uniform vec3 u_bounds_min_ws;
 uniform vec3 u_bounds_max_ws;
+uniform float u_bounds_diagonal_m;
 uniform int u_refraction_iterations;
 uniform int u_refraction_steps;
 uniform int u_reflection_steps;
@@ -32,15 +33,18 @@ Seen seen_at(vec2 uv, float distance_m, GlcSolve solve, float status) {
     return seen;
 }
 
-// At a solved ray's end. The radiance's alpha holds depth: where filtering would mix in another surface, the texel alone counts.
-Seen seen_hit(GlcRasterRay ray, GlcSolve solve, float status) {
+// At a solved ray's end. The radiance's alpha holds depth: where filtering would mix in another surface, the texel alone counts
+// (fetched by the final stage: before it, such a pixel is left to do).
+Seen seen_hit(GlcRasterRay ray, GlcSolve solve, float status, out bool mixes) {
     vec3 end = ray.start + solve.u * ray.step;
-    float depth_m = u_raster_orthographic ? -end.z : 1.0 / end.z;
+    float depth_m = ORTHOGRAPHIC == 1 ? -end.z : 1.0 / end.z;
     vec2 uv = end.xy / u_raster_size;
     vec4 filtered = textureLod(t_radiance, uv, 0.0);
-    vec3 alone = texelFetch(t_radiance, ivec2(solve.texel), 0).rgb;
-    bool mixes = abs(filtered.a - depth_m) > 0.02 * abs(depth_m);
-    Seen seen = Seen(mixes ? alone : filtered.rgb, vec3(0.0), glc_raster_distance(ray, solve.u), uv, solve.error_px, float(solve.iterations), status);
+    mixes = abs(filtered.a - depth_m) > 0.02 * abs(depth_m);
+#if FINAL
+    if (mixes) filtered = texelFetch(t_radiance, ivec2(solve.texel), 0);
+#endif
+    Seen seen = Seen(filtered.rgb, vec3(0.0), glc_raster_distance(ray, solve.u), uv, solve.error_px, float(solve.iterations), status);
 #if HAS_CAUSTICS_VIEW
     seen.caustics = mixes ? texelFetch(t_caustics, ivec2(solve.texel), 0).rgb : textureLod(t_caustics, uv, 0.0).rgb;
 #endif
@@ -86,7 +90,7 @@ GlcRasterRay eye_ray(vec3 p, vec3 d) {
 Seen look_sousa(GlcRasterRay ray, vec3 p, vec3 d) {
     GlcSolve none = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_DIVERGED, 1);
     float own = texelFetch(t_opaque_depth_m, ivec2(clamp(ray.start.xy, vec2(0.5), u_raster_size - 0.5)), 0).r;
-    float start = u_raster_orthographic ? -ray.start.z : 1.0 / ray.start.z;
+    float start = ORTHOGRAPHIC == 1 ? -ray.start.z : 1.0 / ray.start.z;
     float t = own > 0.0 ? own - start : ray.length_m;
     vec4 q = u_raster_from_world * vec4(p + t * d, 1.0);
     vec2 px = clamp(q.w > 0.0 ? q.xy / q.w : ray.start.xy, vec2(0.5), u_raster_size - 0.5);
@@ -102,14 +106,13 @@ Seen look_sousa(GlcRasterRay ray, vec3 p, vec3 d) {
 }
 
 #if USE_MARCH == 1
-#define MARCH(ray, steps) glc_march_dda(t_opaque_depth_m, t_plane, u_raster_orthographic, ray, steps)
+#define MARCH(ray, steps) glc_march_dda(t_opaque_depth_m, t_plane, ORTHOGRAPHIC == 1, ray, steps)
 #elif USE_MARCH == 2
 #define MARCH(ray, steps) glc_march_hierarchical(t_bounds_4, t_bounds_16, t_plane, ray, steps)
 #endif
 
 // Along a refracted ray. solved: false where a later stage should look again.
-Seen look_through(vec3 p, vec3 d, out bool solved) {
-    GlcRasterRay ray = eye_ray(p, d);
+Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved) {
     solved = true;
 #if USE_SOUSA
     return look_sousa(ray, p, d);
@@ -130,7 +133,12 @@ Seen look_through(vec3 p, vec3 d, out bool solved) {
     solved = solve.status == GLC_SOLVE_HIT;
     vec2 uv = (ray.start.xy + solve.u * ray.step.xy) / u_raster_size;
     Seen seen;
-    if (solved) return seen_hit(ray, solve, status);
+    if (solved) {
+        bool mixes;
+        seen = seen_hit(ray, solve, status, mixes);
+        if (mixes && FINAL == 0) solved = false;
+        return seen;
+    }
 #if FINAL
     seen = seen_beyond(ray, d, solve);
 #else
@@ -146,8 +154,9 @@ Seen look_along(vec3 p, vec3 d) {
 #if USE_MARCH
     GlcRasterRay ray = eye_ray(p, d);
     GlcSolve solve = MARCH(ray, u_reflection_steps);
+    bool mixes;
     if (solve.status == GLC_SOLVE_HIT)
-        return seen_hit(ray, solve, GLC_VIEW_MARCHED);
+        return seen_hit(ray, solve, GLC_VIEW_MARCHED, mixes);
     return seen_beyond(ray, d, solve);
 #else
     return Seen(glc_sky_radiance(d), vec3(0.0), 0.0, vec2(-1.0), 0.0, 0.0, GLC_VIEW_SKY);
