@@ -115,9 +115,19 @@ def table(report: Mapping[str, Any]) -> str:
     rows = [r for r in report["rows"] if not r.get("overrides")]
     pixels = max(r["pixels"] for r in rows)
     rows = [r for r in rows if r["pixels"] == pixels]
-    names = "scene|method|quality|relative RMSE|FLIP|bias|frame ms|of it caustics|ptracer, same error|ptracer + OIDN"
-    head = f"| {names.replace('|', ' | ')} |"
-    lines = [head, "|" + "---|" * 10]
+    names = [
+        "scene",
+        "method",
+        "quality",
+        "relative RMSE",
+        "without foci",
+        "FLIP",
+        "bias",
+        "frame ms",
+        "of it caustics",
+    ]
+    head = " | ".join(["", *names, "ptracer, same error", "ptracer + OIDN", ""]).strip()
+    lines = [head, "|" + "---|" * 11]
     for row in rows:
         if row["tool"] != "glcaustics" or row["method"] == "none":
             continue
@@ -125,7 +135,8 @@ def table(report: Mapping[str, Any]) -> str:
         own = caustics_ms(rows, row)
         peers = [_peer_cell(rows, row, method) for method in ("ptracer", "ptracer+oidn")]
         cells = [row["scene"], row["method"], row["quality"]]
-        cells += [_number(e.get("rrmse"), ".4f"), _number(e.get("flip"), ".4f"), _number(e.get("bias"), "+.2%")]
+        cells += [_number(e.get(name), ".4f") for name in ("rrmse", "rrmse_regular", "flip")]
+        cells += [_number(e.get("bias"), "+.2%")]
         cells += [f"{row['time_ms']['median']:.0f}", _number(own, ".0f"), *peers]
         lines.append("| " + " | ".join(cells) + " |")
     state = report["machine"]

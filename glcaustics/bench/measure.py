@@ -20,6 +20,7 @@ from glcaustics.renderer import Renderer
 from glcaustics.scene.model import Scene
 
 FloatArray = npt.NDArray[np.float64]
+SINGULAR = 20.0  # times the mean: brighter pixels lie on foci, where irradiance has no bound but the pixel's size
 WHITE = 4.0  # times the mean irradiance is shown as white where pictures are compared
 
 
@@ -128,10 +129,19 @@ def reduced(halves: Halves, pixels: int) -> Halves:
     return replace(halves, first=box_filter(halves.first, size), second=box_filter(halves.second, size))
 
 
+def regular(reference: FloatArray) -> npt.NDArray[np.bool_]:
+    """(H, W): pixels away from foci, whose few pixels can own the whole RMSE; their neighbours are left out too."""
+    bright = np.pad(reference > SINGULAR * reference.mean(), 1)
+    height, width = reference.shape
+    near = [bright[i : i + height, j : j + width] for i in range(3) for j in range(3)]
+    return ~np.any(near, axis=0)
+
+
 def errors(truth: Halves, image: FloatArray) -> dict[str, Any]:
     """Error measures of an irradiance map; `rrmse` has the truth's own noise taken off.
 
-    A map with values that are not finite gets their share and nothing else.
+    `rrmse_regular`: the same over `regular` pixels alone, relative to their mean. A map with values that are not
+    finite gets their share and nothing else.
     """
     share = metrics.non_finite_share(image)
     if share > 0.0:
@@ -139,6 +149,7 @@ def errors(truth: Halves, image: FloatArray) -> dict[str, Any]:
     mean = truth.mean
     return {
         "rrmse": metrics.relative_rmse(truth.first, image, other_half=truth.second),
+        "rrmse_regular": metrics.relative_rmse(truth.first, image, other_half=truth.second, mask=regular(mean)),
         "mae": metrics.mean_absolute_error(mean, image),
         "bias": metrics.bias_of_mean(mean, image),
         "psnr_db": metrics.psnr(mean, image, peak=WHITE * float(mean.mean())),

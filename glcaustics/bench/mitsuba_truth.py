@@ -26,6 +26,7 @@ FloatArray = npt.NDArray[np.float64]
 ALBEDO = 1e-3
 MITSUBA_VERSION = 3  # of the cache: raise it when this module's results change
 SAMPLES_PER_PASS = 256  # per pixel; more in one pass loses digits in the film's float32
+PHOTONS_PER_PASS = 1 << 18  # at least, or small films would take many passes
 SEED_STRIDE = 1_000_003
 HALF_M = 20.0  # of the target as Mitsuba gets it: it starts rays 0.1 mm off surfaces, and more the farther out
 
@@ -90,11 +91,12 @@ class PhotonMap:
             direct: keep light that met no caster.
         """
         film_pixels = self._pinhole.side**2
-        spp, done = max(1, -(-photons // film_pixels)), 0
+        spp, done = self.photons(photons) // film_pixels, 0
+        each = max(SAMPLES_PER_PASS, PHOTONS_PER_PASS // film_pixels)
         total = np.zeros((self._pixels, self._pixels))
         while done < spp:
-            count = min(SAMPLES_PER_PASS, spp - done)
-            run = seed * SEED_STRIDE + done // SAMPLES_PER_PASS
+            count = min(each, spp - done)
+            run = seed * SEED_STRIDE + done // each
             start = time.perf_counter()
             image = self._pass(self._depth, count, run)
             self.seconds += time.perf_counter() - start
@@ -103,6 +105,11 @@ class PhotonMap:
             total += image * count
             done += count
         return total / spp
+
+    def photons(self, at_least: int) -> int:
+        """The number that is really traced: a whole number for each pixel of the film."""
+        film_pixels = self._pinhole.side**2
+        return film_pixels * max(1, -(-at_least // film_pixels))
 
     def _pass(self, depth: int, spp: int, seed: int) -> FloatArray:
         mi = self._mi
@@ -242,10 +249,10 @@ def seen_radiance(
     x, y, z = target.centre_ws
     emission = np.ascontiguousarray((irradiance * (albedo / math.pi))[..., None], np.float32)
     lift = 1e-4 * target.half_m
-    # `look` along +y with up +z: the rectangle's own x axis is then +x, its v grows with z; bitmaps put row 0 at v = 1
+    # `look` along +y with up -z: the rectangle's u is +x and its v is -z; a bitmap's last row is at v = 1
     parts["caustic"] = {
         "type": "rectangle",
-        "to_world": look(mi, (x, y + lift, z), (0, 1, 0), (0, 0, 1), (target.half_m, target.half_m, 1.0)),
+        "to_world": look(mi, (x, y + lift, z), (0, 1, 0), (0, 0, -1), (target.half_m, target.half_m, 1.0)),
         "bsdf": {"type": "diffuse", "reflectance": 0.0},
         "emitter": {
             "type": "area",

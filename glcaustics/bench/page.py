@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from glcaustics.bench.analysis import caustics_ms
-from glcaustics.bench.measure import WHITE, display
+from glcaustics.bench.measure import SINGULAR, WHITE, display
 from glcaustics.bench.plots import judged
 
 FloatArray = npt.NDArray[np.float64]
@@ -111,7 +111,9 @@ def _scene(report: Report, scene: str, images: Mapping[str, FloatArray], plots: 
     plot = _image(plots[f"error-{scene}.png"], "plot", f"error against time, {scene}")
     return (
         f"<h2>{html.escape(scene)}</h2><p><small>{html.escape(source['source'])}; noise {source['noise']:.2%} of the "
-        f"mean. Error maps: red is too bright, blue too dark, full colour at {ERROR_SPAN:g} times the mean."
+        f"mean. Error maps: red is too bright, blue too dark, full colour at {ERROR_SPAN:g} times the mean. "
+        f"Foci (pixels above {SINGULAR:g} times the mean, and their neighbours): {source['singular_pixels']:.2%} of "
+        f"the pixels, {source['singular_flux']:.1%} of the flux."
         f'</small></p><div class="maps">{"".join(figures)}</div>{plot}{_numbers(report, scene)}'
     )
 
@@ -132,14 +134,15 @@ def _errors(row: Mapping[str, Any]) -> str:
 
 
 def _numbers(report: Report, scene: str) -> str:
-    head = ["tool", "step", "pixels", "relative RMSE", "MAE", "bias", "FLIP", "PSNR dB"]
+    head = ["tool", "step", "pixels", "relative RMSE", "without foci", "MAE", "bias", "FLIP", "PSNR dB"]
     head += ["median ms", "min-max ms", "of it caustics", "set-up ms", "MB"]
     lines = []
     for r in (r for r in report["rows"] if r["scene"] == scene):
         e, t = r["errors"], r["time_ms"]
         own = caustics_ms(report["rows"], r) if r["tool"] == "glcaustics" and r["method"] != "none" else None
         memory = r.get("bytes_allocated")
-        numbers = [_show(e.get("rrmse"), ".4f"), _show(e.get("mae"), ".4f"), _show(e.get("bias"), "+.2%")]
+        numbers = [_show(e.get(name), ".4f") for name in ("rrmse", "rrmse_regular", "mae")]
+        numbers += [_show(e.get("bias"), "+.2%")]
         numbers += [_show(e.get("flip"), ".4f"), _show(e.get("psnr_db"), ".1f")]
         times = [
             f"{t['median']:.1f}",

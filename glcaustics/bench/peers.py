@@ -35,7 +35,7 @@ class PtracerPeer:
             self._tracer.seconds = 0.0
             image = self._tracer.render(photons, seed=31 + run)
             values.append(1e3 * self._tracer.seconds)
-        return self._row("ptracer", photons, values), image
+        return self._row("ptracer", self._tracer.photons(photons), values), image
 
     def _row(self, method: str, photons: int, values: list[float]) -> dict[str, Any]:
         return {

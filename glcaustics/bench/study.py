@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -17,7 +15,7 @@ import numpy.typing as npt
 import glcaustics
 from glcaustics.bench.analysis import fit_power, pareto
 from glcaustics.bench.machine import code_key, commit, machine, versions
-from glcaustics.bench.measure import Case, Timing, errors, measure, reduced
+from glcaustics.bench.measure import Case, Timing, errors, measure, reduced, regular
 from glcaustics.bench.mitsuba_truth import Halves, mitsuba_reference
 from glcaustics.bench.peers import PtracerPeer, has_denoiser
 from glcaustics.bench.progress import Progress
@@ -144,6 +142,7 @@ class Study:
         self._progress.step(f"{scene.name}: reference beams")
         truth = beam_reference(scene, target, self.plan.largest, self.plan.cells, self._truths)
         mean = float(truth.mean.mean())
+        singular = ~regular(truth.mean)
         references.append(
             {
                 "scene": scene.name,
@@ -151,6 +150,8 @@ class Study:
                 "pixels": self.plan.largest,
                 "mean": mean,
                 "noise": float(truth.noise) / mean,
+                "singular_pixels": float(singular.mean()),
+                "singular_flux": float(truth.mean[singular].sum() / truth.mean.sum()),
                 "seconds": truth.seconds,
             }
         )
@@ -262,7 +263,7 @@ class Study:
         return {
             "schema": SCHEMA,
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
-            "command": self.command or shlex.join(["glcaustics", *sys.argv[1:]]),
+            "command": self.command,
             "glcaustics": glcaustics.__version__,
             **commit(),
             "code": code_key(),

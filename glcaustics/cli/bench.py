@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 import sys
 from collections.abc import Iterable
 from dataclasses import replace
@@ -55,7 +56,8 @@ def _measure(args: argparse.Namespace) -> dict[str, Any]:
     from glcaustics.bench.study import Study
 
     folder = Path(args.output)
-    study = Study(_plan(args), folder, peers=args.peers)
+    arguments = [a for a in sys.argv[1:] if a != "bench"]
+    study = Study(_plan(args), folder, peers=args.peers, command=shlex.join(["glcaustics", "bench", *arguments]))
     report = study.run()
     drawn = plots(report)
     (folder / "plots").mkdir(exist_ok=True)
