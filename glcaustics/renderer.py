@@ -400,7 +400,9 @@ class Renderer:
         if time != self._time:
             self._gpu.update(self.scene.instances_at(time))
             self._time = time
-        camera = CameraState.make(self.scene.view_at(time), self.size, self._setup.scene_bounds_ws, jitter_px)
+        boxes = np.stack([item.bounds_ws for item in self._gpu.items])
+        view = self.scene.view_at(time)
+        camera = CameraState.make(view, self.size, self._setup.scene_bounds_ws, jitter_px, boxes)
         before, transforms = self._previous or (camera, {})
         return FrameState(time, camera, before, self._gpu, self._exposure(), transforms)
 

@@ -15,7 +15,7 @@ from glcaustics.caustics.branches import branches_of, read_rgba32f
 from glcaustics.gpu import Device
 from glcaustics.graph import FrameGraph
 from glcaustics.passes.frame import FrameSetup, FrameState, LightSetup, receiver_views
-from glcaustics.passes.geometry import points_of
+from glcaustics.passes.geometry import boxes_of, points_of
 from glcaustics.passes.light_views import LightView, fit_view
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.scene.model import FloatArray, Light, OpticalKind
@@ -42,7 +42,10 @@ def fit_receivers(
     coarse = replace(
         setup, options={**setup.options, "march_steps": max(32, int(setup.options["march_steps"]))}, lights=[]
     )
-    caster = fit_view(light.light, casters, COARSE_CASTER, depth_points_ws=points_of(everything))
+    boxes = boxes_of(i for i in everything if i.optical_kind is OpticalKind.DIFFUSE)
+    caster = fit_view(
+        light.light, casters, COARSE_CASTER, depth_points_ws=points_of(everything), boxes_ws=boxes_of(everything)
+    )
     coarse_light = replace(light, caster=caster, receivers=receiver_views(everything, light.light, COARSE_MAP))
     coarse.lights = [coarse_light]
     shares: dict[str, float] = {}
@@ -50,9 +53,8 @@ def fit_receivers(
         landed, shares = _coarse_solve(method, device, coarse, coarse_light, frame)
         for name, (points, weights) in landed.items():
             if len(points):
-                view = _window(
-                    coarse_light.receivers[name].view.light, points, weights, texels, setup.is_animated, receivers
-                )
+                seen_from = coarse_light.receivers[name].view.light
+                view = _window(seen_from, points, weights, texels, setup.is_animated, receivers, boxes)
                 coarse_light.receivers[name] = replace(coarse_light.receivers[name], view=view)
     light.receivers = coarse_light.receivers
     return shares
@@ -87,17 +89,24 @@ def _coarse_solve(
 
 
 def _window(
-    light: Light, points: FloatArray, weights: FloatArray, texels: int, animated: bool, receivers: FloatArray
+    light: Light,
+    points: FloatArray,
+    weights: FloatArray,
+    texels: int,
+    animated: bool,
+    receivers: FloatArray,
+    boxes: FloatArray,
 ) -> LightView:
     """The view that holds all of the landing flux but LOST_SHARE on each side."""
-    first = fit_view(light, points, texels, depth_points_ws=receivers)
+    first = fit_view(light, points, texels, depth_points_ws=receivers, boxes_ws=boxes)
     if first.faces == 6:
         return first
     u, v = _window_coordinates(first, points)
     keep = _inner(u, weights) & _inner(v, weights)
     kept = points[keep] if keep.any() else points
     border = max(2.0, AIR[animated] * texels)
-    return fit_view(light, kept, texels, depth_points_ws=np.concatenate([receivers, kept]), border_texels=border)
+    held = np.concatenate([receivers, kept])
+    return fit_view(light, kept, texels, depth_points_ws=held, border_texels=border, boxes_ws=boxes)
 
 
 def _window_coordinates(view: LightView, points: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -12,7 +12,7 @@ import numpy as np
 from glcaustics.errors import GraphError
 from glcaustics.gpu import Device
 from glcaustics.graph import Step, check_read, check_write
-from glcaustics.passes.geometry import SPECULAR_KINDS, GpuScene, points_of
+from glcaustics.passes.geometry import SPECULAR_KINDS, GpuScene, boxes_of, points_of
 from glcaustics.passes.light_views import LightView, fit_view, orthographic, perspective, unit
 from glcaustics.scene.model import Camera, FloatArray, Instance, IntArray, Light, LightKind, OpticalKind, Scene
 
@@ -125,10 +125,14 @@ class FrameSetup:
         setup.grounds = _grounds(everything, light)
         blockers = [i for i in everything if self.throws_shadow(i, setup)]
         if blockers:
-            setup.shadow = fit_view(light, points_of(blockers), int(self.options["shadow_size"]))
+            setup.shadow = fit_view(
+                light, points_of(blockers), int(self.options["shadow_size"]), boxes_ws=boxes_of(blockers)
+            )
         casters = [i for i in everything if i.optical_kind in SPECULAR_KINDS]
         if casters and self.has_receivers and "caster_size" in self.options:
-            setup.caster = fit_view(light, points_of(casters), int(self.options["caster_size"]), depth_points_ws=points)
+            size = int(self.options["caster_size"])
+            boxes = boxes_of(everything)
+            setup.caster = fit_view(light, points_of(casters), size, depth_points_ws=points, boxes_ws=boxes)
             setup.receivers = receiver_views(everything, light, int(self.options["map_size"]))
         return setup
 
@@ -186,15 +190,16 @@ def _unique_planes(normals: FloatArray, origins: FloatArray, *, flat: bool) -> l
 
 def receiver_views(everything: tuple[Instance, ...], light: Light, texels: int) -> dict[str, ReceiverView]:
     """The receiver views that the scene's specular surfaces call for, fitted to all receivers."""
-    receivers = points_of([i for i in everything if i.optical_kind is OpticalKind.DIFFUSE])
+    diffuse = [i for i in everything if i.optical_kind is OpticalKind.DIFFUSE]
+    receivers, boxes = points_of(diffuse), boxes_of(diffuse)
     interfaces = [i for i in everything if i.optical_kind is OpticalKind.INTERFACE]
-    views = {BESIDE: ReceiverView(BESIDE, fit_view(light, receivers, texels))}
+    views = {BESIDE: ReceiverView(BESIDE, fit_view(light, receivers, texels, boxes_ws=boxes))}
     if interfaces:
         virtual, plane = light_below(interfaces, light)
         under = receivers if plane is None else receivers[receivers @ np.asarray(plane[:3]) + plane[3] > 0.0]
         if plane is not None and len(under) == 0:
             under = receivers
-        views[BELOW] = ReceiverView(BELOW, fit_view(virtual, under, texels), plane)
+        views[BELOW] = ReceiverView(BELOW, fit_view(virtual, under, texels, boxes_ws=boxes), plane)
     return views
 
 
@@ -243,6 +248,26 @@ def _mean_normal(instance: Instance) -> FloatArray:
     return np.asarray(np.cross(b - a, c - a).sum(axis=0))
 
 
+def _near_m(world_from_camera: FloatArray, lens: tuple[float, float], boxes_ws: FloatArray) -> float:
+    """How far the near plane may stand off, metres: before the nearest box (N, 2, 3) that reaches in front of the camera.
+
+    The scene's size alone would push the plane past everything that stands on a huge ground. Inside of a box its own size decides.
+    """
+    eye, forward = world_from_camera[:3, 3], -world_from_camera[:3, 2]
+    low, high = boxes_ws[:, 0], boxes_ws[:, 1]
+    reach = np.where(forward > 0.0, high, low) @ forward - eye @ forward
+    start = np.where(forward > 0.0, low, high) @ forward - eye @ forward
+    away = np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0.0), axis=1)
+    corner = 1.0 / np.sqrt(1.0 + lens[0] ** 2 + lens[1] ** 2)  # cosine of the ray farthest off the axis
+    inside = 5e-4 * np.linalg.norm(high - low, axis=1)
+    near = np.maximum(0.999 * np.maximum(start, away * corner), np.where(away > 0.0, 0.0, inside))
+    near = np.where(reach > 0.0, near, np.inf)
+    touching = 2e-4 * float(
+        np.quantile(np.linalg.norm(high - low, axis=1), 0.25, method="lower")
+    )  # the eye on a surface
+    return max(float(near.min()), touching)
+
+
 def _box(points: FloatArray) -> FloatArray:
     """(2, 3) bounding box, with a little air so that flat boxes have an inside."""
     if len(points) == 0:
@@ -265,11 +290,16 @@ class CameraState:
 
     @staticmethod
     def make(
-        camera: Camera, size: tuple[int, int], bounds_ws: FloatArray, jitter_px: tuple[float, float] = (0.0, 0.0)
+        camera: Camera,
+        size: tuple[int, int],
+        bounds_ws: FloatArray,
+        jitter_px: tuple[float, float] = (0.0, 0.0),
+        boxes_ws: FloatArray | None = None,
     ) -> CameraState:
         """Clip planes fitted to the scene's box, so that depth is well conditioned at any scale.
 
         Args:
+            boxes_ws: (N, 2, 3), a box an object: the near plane stands before the nearest, however large the scene is.
             jitter_px: shift of the picture by a part of a pixel, for anti-aliasing over several samples.
         """
         world_from_camera = np.asarray(camera.world_from_camera, np.float64)
@@ -286,9 +316,10 @@ class CameraState:
             lens = (camera.ymag_m * aspect, camera.ymag_m)
             projection = orthographic(-lens[0], lens[0], -lens[1], lens[1], near, far)
         else:
-            near = max(float(depth.min()) * 0.999, 5e-4 * far)
             tangent = float(np.tan(0.5 * camera.yfov_rad))
             lens = (tangent * aspect, tangent)
+            boxes = bounds_ws[None] if boxes_ws is None or len(boxes_ws) == 0 else boxes_ws
+            near = max(float(depth.min()) * 0.999, min(_near_m(world_from_camera, lens, boxes), 0.5 * far), 1e-7 * far)
             projection = perspective(-lens[0], lens[0], -lens[1], lens[1], near, far)
         jitter_uv = (jitter_px[0] / size[0], jitter_px[1] / size[1])
         shift = np.eye(4)

@@ -73,6 +73,12 @@ def _unchanged(item: DrawItem, instance: Instance) -> bool:
     return same and old.world_from_object is instance.world_from_object and old.name == instance.name
 
 
+def boxes_of(instances: Iterable[Instance]) -> FloatArray:
+    """`bounds_ws` of each, (N, 2, 3)."""
+    boxes = [bounds_ws(instance) for instance in instances]
+    return np.stack(boxes) if boxes else np.zeros((0, 2, 3))
+
+
 class GpuScene:
     """Keeps the meshes of a scene on the GPU; meshes of equal identity are uploaded once, moving ones in place."""
 

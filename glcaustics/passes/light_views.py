@@ -180,6 +180,7 @@ def fit_view(
     depth_points_ws: FloatArray | None = None,
     size: tuple[int, int] | None = None,
     border_texels: float = 2.0,
+    boxes_ws: FloatArray | None = None,
 ) -> LightView:
     """The tightest view of a light that holds all points.
 
@@ -188,12 +189,22 @@ def fit_view(
         texels: the texture has about `texels`^2 texels.
         depth_points_ws: (M, 3); what the depth range must hold, if more than the points (occluders).
         size: fixes the texture's size, else it follows the aspect ratio of the window.
+        boxes_ws: (N, 2, 3), a box an object: how near to a lamp surfaces come. Their vertices do not tell: those of a large
+            ground are all far away.
     """
     depths_ws = points_ws if depth_points_ws is None else depth_points_ws
     if light.kind is LightKind.DIRECTIONAL:
         return _fit_directional(light, points_ws, texels, depths_ws, size, border_texels)
-    view = _fit_frustum(light, points_ws, texels, depths_ws, size, border_texels)
-    return view if view is not None else cube_view(light, texels, depths_ws)
+    nearest = None if boxes_ws is None or len(boxes_ws) == 0 else nearest_box_m(np.asarray(light.position_ws), boxes_ws)
+    view = _fit_frustum(light, points_ws, texels, depths_ws, size, border_texels, nearest)
+    return view if view is not None else cube_view(light, texels, depths_ws, nearest)
+
+
+def nearest_box_m(position_ws: FloatArray, boxes_ws: FloatArray) -> float:
+    """Least distance from a point to what is in some boxes (N, 2, 3), metres; within a box, a thousandth of its diagonal."""
+    low, high = boxes_ws[:, 0], boxes_ws[:, 1]
+    away = np.linalg.norm(np.maximum(np.maximum(low - position_ws, position_ws - high), 0.0), axis=1)
+    return float(np.maximum(away, 1e-3 * np.linalg.norm(high - low, axis=1) * (away == 0.0)).min())
 
 
 def _fit_directional(
@@ -217,7 +228,13 @@ def _fit_directional(
 
 
 def _fit_frustum(
-    light: Light, points: FloatArray, texels: int, depths: FloatArray, size: tuple[int, int] | None, border: float
+    light: Light,
+    points: FloatArray,
+    texels: int,
+    depths: FloatArray,
+    size: tuple[int, int] | None,
+    border: float,
+    nearest_m: float | None,
 ) -> LightView | None:
     position = np.asarray(light.position_ws, np.float64)
     cone = math.tan(light.outer_cone_rad) if light.kind is LightKind.SPOT and light.outer_cone_rad < 1.5 else math.inf
@@ -241,18 +258,22 @@ def _fit_frustum(
     if size is None:
         size = fit_size(texels, float(np.ptp(u)) / max(float(np.ptp(v)), 1e-30))
     rect = _grow(np.array([u.min(), u.max(), v.min(), v.max()]), size, border)
-    near, far = depth_range((depths - position) @ forward, _extent(depths), positional=True)
+    along = (depths - position) @ forward
+    near, far = depth_range(along, _extent(depths), positional=True)
+    if nearest_m is not None and float(along.min()) < near:  # some points stand beside or behind the light
+        rim = math.sqrt(1.0 + max(rect[0] ** 2, rect[1] ** 2) + max(rect[2] ** 2, rect[3] ** 2))
+        near = min(near, max(0.999 * nearest_m / rim, 1e-7 * far))
     matrix = perspective(*rect, near, far) @ _affine(right, up, forward, position)
     measure = (rect[1] - rect[0]) * (rect[3] - rect[2]) / (size[0] * size[1])
     return LightView(light, 1, size, (matrix,), measure, forward, right, up, rect, near, far)
 
 
-def cube_view(light: Light, texels: int, depths_ws: FloatArray) -> LightView:
+def cube_view(light: Light, texels: int, depths_ws: FloatArray, nearest_m: float | None = None) -> LightView:
     """Six 90-degree faces in a 3x2 atlas with about `texels`^2 texels."""
     tile = max(16, round(texels / math.sqrt(6.0) / 8) * 8)
     position = np.asarray(light.position_ws, np.float64)
     far = float(np.linalg.norm(depths_ws - position, axis=1).max()) * 1.01
-    near = 1e-3 * far
+    near = 1e-3 * far if nearest_m is None else min(max(0.999 * nearest_m / math.sqrt(3.0), 1e-7 * far), 0.5 * far)
     projection = perspective(-1, 1, -1, 1, near, far)
     matrices = tuple(
         projection @ _affine(np.cross(f, up), up, f, position) for f, up in zip(CUBE_FORWARD, CUBE_UP, strict=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 from glcaustics.gpu import Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext
-from glcaustics.passes.geometry import DrawItem, points_of
+from glcaustics.passes.geometry import DrawItem, boxes_of, points_of
 from glcaustics.passes.light_views import fit_view, light_uniforms
 from glcaustics.scene.model import OpticalKind
 
@@ -28,11 +28,12 @@ def declare(graph: FrameGraph, setup: FrameSetup, light: LightSetup, *, with_spe
         graph.leave_out(name, "the light reaches nothing")
         return
     kinds = tuple(OpticalKind) if with_specular else (OpticalKind.DIFFUSE,)
-    points = points_of([i for i in setup.instances() if i.optical_kind in kinds])
+    seen = [i for i in setup.instances() if i.optical_kind in kinds]
+    points = points_of(seen)
     if len(points) == 0:
         graph.leave_out(name, "nothing opaque in the scene")
         return
-    view = fit_view(light.light, points, int(setup.options["rsm_size"]))
+    view = fit_view(light.light, points, int(setup.options["rsm_size"]), boxes_ws=boxes_of(seen))
     writes = {light.resource(f"{layer}.{n}"): TextureDesc(f, view.size, u) for n, (f, u) in ATTACHMENTS.items()}
     depth = light.resource(f"{layer}.depth")
     writes[depth] = TextureDesc("depth24", view.size)

@@ -12,7 +12,7 @@ from glcaustics.renderer import AOVS, Frame
 from glcaustics.scene.model import Scene
 from glcaustics.scene.transform import scaled
 from tests.gpu.feature_scenes import BACKEND
-from tests.robustness.hard_scenes import SCENES, everything, moved
+from tests.robustness.hard_scenes import SCENES, everything, ground, moved
 
 pytestmark = pytest.mark.gpu
 SIZE = (48, 36)
@@ -96,3 +96,18 @@ def test_far_from_the_origin_the_picture_stays() -> None:
     rmse = np.sqrt(np.mean((first.ldr.astype(float) - other.ldr) ** 2)) / 255.0
     print(f"1 km away: RMSE {rmse:.4f}")
     assert rmse < 0.02
+
+
+def test_a_huge_ground_hides_nothing() -> None:
+    """Neither the camera's near plane nor the lamp's may run over what stands on a ground 10 000 times its size."""
+    small, huge = (render(ground(size), (96, 72)) for size in (30.0, 1e4))
+    lower = slice(30, None)  # below the horizon
+    np.testing.assert_allclose(huge.aov["depth_m"][lower], small.aov["depth_m"][lower], rtol=1e-3)
+    a, b = (f.aov["caustic_irradiance"][lower].astype(np.float64) for f in (small, huge))
+    print(
+        f"huge ground: caustic {b.sum() / a.sum():.4f} of that on a small one, direct "
+        f"{huge.aov['direct_irradiance'][lower].sum() / small.aov['direct_irradiance'][lower].sum():.4f}"
+    )
+    assert b.sum() == pytest.approx(a.sum(), rel=0.02)
+    direct = [f.aov["direct_irradiance"][lower].sum() for f in (small, huge)]
+    assert direct[1] == pytest.approx(direct[0], rel=0.01)
