@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -76,7 +77,7 @@ class Store:
             document = json.loads((self.folder / f"{key}.json").read_text(encoding="utf-8"))
             with np.load(self.folder / f"{key}.npz") as file:
                 return document, {name: file[name] for name in file.files}
-        except (OSError, ValueError, EOFError):
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile):
             return None
 
     def save(self, key: str, document: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) -> None:
