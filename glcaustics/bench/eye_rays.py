@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from glcaustics.errors import UsageError
 from glcaustics.renderer import Renderer
 from glcaustics.scene.model import Camera, FloatArray, Scene
 
@@ -21,7 +22,7 @@ class EyeConvergence:
 
     `pixels`: specular pixels; `resolvable`: of them, the share. `within_1px[k]`: Newton's estimate after k iterations
     lies within one pixel (max norm) of the marched hit. `reported[k]`: and Newton itself says that it is solved.
-    `wrong[k]`: says so, but is more than one pixel off. `cascade`, `hierarchical`: share solved within one pixel by these.
+    `wrong[k]`: says so, but is more than one pixel off. `cascade`, `hierarchical`: solved within 1 px by these.
     """
 
     pixels: int
@@ -80,6 +81,8 @@ def eye_convergence(
 
     status, hit = solve("dda")
     specular, resolvable = status > 0, status == SOLVED_BY_MARCHING
+    if not resolvable.any():
+        raise UsageError(f"scene '{scene.name}' shows no refraction from this camera", where="eye_convergence")
 
     def near(px: FloatArray) -> FloatArray:
         return np.abs(px - hit).max(axis=-1)[resolvable] <= 1.0

@@ -56,23 +56,28 @@ Seen seen_hit(GlcRasterRay ray, GlcSolve solve, float status, out bool mixes) {
 // is the sky. Continuous at the picture's border and at the rims of objects, and without streaks.
 Seen seen_beyond(GlcRasterRay ray, vec3 d, GlcSolve solve) {
 #if USE_NEWTON || USE_MARCH
-    vec2 px = clamp(ray.start.xy + min(solve.u_front, ray.u_screen) * ray.step.xy, vec2(0.5), u_raster_size - 0.5);
+    // Two pixels back: the rim itself is an edge-on surface as often as not.
+    float back = 2.0 / max(max(abs(ray.step.x), abs(ray.step.y)), 1e-6);
+    float u_last = max(min(solve.u_front, ray.u_screen) - back, 0.0);
+    vec2 px = clamp(ray.start.xy + u_last * ray.step.xy, vec2(0.5), u_raster_size - 0.5);
     vec4 plane = texelFetch(t_plane, ivec2(px), 0);
     vec2 f = glc_raster_plane(ray, plane);
     float met = f.x / (f.y < 0.0 ? f.y : -1e-30);
     bool hidden = solve.status == GLC_SOLVE_HIDDEN;
     bool meets = f.y < 0.0 && met > 0.0 && met <= 1.0;
     if (hidden && !meets && plane.w > 0.0) {   // behind something, and the surface before it does not reach there: its rim
-        met = solve.u_front;
+        met = u_last;
         meets = true;
     }
     if (meets) {
         vec2 beyond = ray.start.xy + met * ray.step.xy - px;
-        vec2 mirrored = px - beyond * min(1.0, 0.1 * u_raster_size.y / max(length(beyond), 1.0));
-        mirrored = clamp(mirrored, vec2(0.5), u_raster_size - 0.5);
+        // To and fro over a quarter of the picture's height, should it go on for long.
+        float reach = length(beyond), fold = 0.25 * u_raster_size.y;
+        float folded = fold - abs(mod(reach, 2.0 * fold) - fold);
+        vec2 mirrored = clamp(px - beyond * (folded / max(reach, 1e-3)), vec2(0.5), u_raster_size - 0.5);
         vec4 other = texelFetch(t_plane, ivec2(mirrored), 0);
         float s = plane.z + dot(plane.xy, mirrored);
-        if (other.w > 0.0 && abs(other.z + dot(other.xy, mirrored) - s) < 0.01 * abs(s)) px = mirrored;
+        if (other.w > 0.0 && abs(other.z + dot(other.xy, mirrored) - s) < 0.04 * abs(s)) px = mirrored;
         float status = solve.status == GLC_SOLVE_OFFSCREEN ? GLC_VIEW_OFFSCREEN : (hidden ? GLC_VIEW_HIDDEN : GLC_VIEW_FALLBACK);
         return seen_at(px / u_raster_size, glc_raster_distance(ray, met), solve, status);
     }
