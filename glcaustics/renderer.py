@@ -394,12 +394,15 @@ class Renderer:
         _, kept = self._declared.graph.compile(outputs=outputs).kept()
         plan = self._declared.graph.compile(outputs=tuple(dict.fromkeys((*outputs, *kept))))
         self._runner = PlanRunner(self.device, plan, self._setup)
+        self._gpu.keep_previous = bool({"gbuffer.motion", "specular.motion"} & plan.slots.keys())
         return self._runner
 
     def _frame_state(self, time: float, jitter_px: tuple[float, float] = (0.0, 0.0)) -> FrameState:
         if time != self._time:
             self._gpu.update(self.scene.instances_at(time))
             self._time = time
+        else:
+            self._gpu.hold()
         boxes = np.stack([item.bounds_ws for item in self._gpu.items])
         view = self.scene.view_at(time)
         camera = CameraState.make(view, self.size, self._setup.scene_bounds_ws, jitter_px, boxes)

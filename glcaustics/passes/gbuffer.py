@@ -56,6 +56,7 @@ def declare_specular(graph: FrameGraph, setup: FrameSetup) -> None:
                 "specular.depth_m": TextureDesc("r32f", setup.size, "m"),
                 "specular.normal_ws": TextureDesc("rgba32f", setup.size),
                 "specular.plane": TextureDesc("rgba32f", setup.size),
+                "specular.motion": TextureDesc("rg16f", setup.size, "uv"),
                 "specular.depth": TextureDesc("depth24", setup.size),
             },
             _draw_specular,
@@ -68,9 +69,10 @@ def declare_specular(graph: FrameGraph, setup: FrameSetup) -> None:
 
 
 def _draw_specular(ctx: PassContext) -> None:
-    target = ctx.target("specular.depth_m", "specular.normal_ws", "specular.plane", depth="specular.depth")
+    names = ("depth_m", "normal_ws", "plane", "motion")
+    target = ctx.target(*(f"specular.{n}" for n in names), depth="specular.depth")
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-    live = ctx.locations(DEPTH_M="specular.depth_m", NORMAL_WS="specular.normal_ws", PLANE="specular.plane")
+    live = ctx.locations(**{n.upper(): f"specular.{n}" for n in names})
     defines = {**NOTHING, **live, "LAYER_SPECULAR": 1, "BACK": 0}
     _draw(
         ctx,
@@ -128,7 +130,8 @@ def _draw(
             "HAS_EMISSIVE_MAP": int(bool(defines["HAS_EMISSIVE"]) and material.emissive_image is not None),
         }
         normals = {"HAS_NORMAL": defines["HAS_NORMAL_WS"], "HAS_UV": int(any(maps.values()))}
-        made = ctx.device.program(SHADER, {**defines, **maps, **normals})
+        motion = {"HAS_PREVIOUS_POSITION": int(bool(defines["HAS_MOTION"]) and item.mesh.changed)}
+        made = ctx.device.program(SHADER, {**defines, **maps, **motion, **normals})
         made.set_all({**camera.uniforms(), "u_clip_from_world": camera.clip_from_world, **textures})
         if made.declares("t_objects"):
             made.set(t_objects=ctx.frame.gpu.objects)

@@ -18,12 +18,17 @@ _LAYOUT = (("3f", "3x4", "in_position"), ("3f", "3x4", "in_normal"), ("2f", "2x4
 
 @dataclass(eq=False)
 class GpuMesh:
-    """Interleaved position, normal, uv (8 float32 a vertex) and 32-bit indices."""
+    """Interleaved position, normal, uv (8 float32 a vertex) and 32-bit indices.
+
+    `previous`: the vertices of the frame before, of a mesh that changes; `changed`: whether this frame's are others.
+    """
 
     mesh: Mesh
     vertices: moderngl.Buffer
     indices: moderngl.Buffer
     arrays: dict[Program, moderngl.VertexArray]
+    previous: moderngl.Buffer | None = None
+    changed: bool = False
 
     def array(self, device: Device, program: Program) -> moderngl.VertexArray:
         """The vertex array of this mesh for a program: only the inputs that the program has."""
@@ -32,7 +37,10 @@ class GpuMesh:
             inputs = program.source.attributes
             layout = " ".join(read if name in inputs else skip for read, skip, name in _LAYOUT)
             names = [name for _, _, name in _LAYOUT if name in inputs]
-            found = device.vertex_array(program, [(self.vertices, layout, *names)], self.indices)
+            content: list[tuple[Any, ...]] = [(self.vertices, layout, *names)]
+            if self.previous is not None and "in_previous_position" in inputs:
+                content.append((self.previous, "3f 5x4", "in_previous_position"))
+            found = device.vertex_array(program, content, self.indices)
             self.arrays[program] = found
         return found
 
@@ -41,6 +49,8 @@ class GpuMesh:
             array.release()
         self.vertices.release()
         self.indices.release()
+        if self.previous is not None:
+            self.previous.release()
 
 
 @dataclass(eq=False)
@@ -80,7 +90,12 @@ def boxes_of(instances: Iterable[Instance]) -> FloatArray:
 
 
 class GpuScene:
-    """Keeps the meshes of a scene on the GPU; meshes of equal identity are uploaded once, moving ones in place."""
+    """Keeps the meshes of a scene on the GPU; meshes of equal identity are uploaded once, moving ones in place.
+
+    `keep_previous`: copy the vertices of a changing mesh before they are overwritten, for motion vectors.
+    """
+
+    keep_previous = False
 
     def __init__(self, device: Device) -> None:
         self.device = device
@@ -96,6 +111,7 @@ class GpuScene:
         if len(instances) == len(self.items) and all(map(_unchanged, self.items, instances)):
             return
         self.version += 1
+        self.hold()
         old_by_name = {item.instance.name: item for item in self.items}
         wanted = {id(instance.mesh) for instance in instances}
         items = []
@@ -116,6 +132,11 @@ class GpuScene:
         self._drop_unused(wanted)
         self._write_objects()
 
+    def hold(self) -> None:
+        """The next frame shows the same meshes as the last one."""
+        for mesh in self._meshes.values():
+            mesh.changed = False
+
     def _mesh(self, mesh: Mesh, reuse: GpuMesh | None) -> GpuMesh:
         found = self._meshes.get(id(mesh))
         if found is not None:
@@ -123,6 +144,12 @@ class GpuScene:
         data = interleave(mesh)
         if reuse is not None and reuse.vertices.size == data.nbytes and reuse.mesh.triangles is mesh.triangles:
             self._meshes.pop(id(reuse.mesh), None)
+            if self.keep_previous:
+                if reuse.previous is None:
+                    label = f"mesh {mesh.name}, the frame before"
+                    reuse.previous = self.device.buffer(reserve=data.nbytes, label=label, dynamic=True)
+                self.device.ctx.copy_buffer(reuse.previous, reuse.vertices)
+                reuse.changed = True
             reuse.vertices.write(data.tobytes())
             reuse.mesh = mesh
             self._meshes[id(mesh)] = reuse

@@ -18,7 +18,7 @@ from glcaustics.passes.frame import CameraState, FrameSetup, FrameState
 from glcaustics.passes.geometry import GpuScene
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.renderer import AOVS, resolve_options
-from glcaustics.scene.model import Camera, Image, Instance, Material, Scene
+from glcaustics.scene.model import Camera, Image, Instance, Material, Mesh, Scene, WaterBody
 from tests.gpu.feature_scenes import (
     BACKEND,
     GLASS,
@@ -166,6 +166,57 @@ def test_motion_of_a_moving_object(device: Device) -> None:
     np.testing.assert_allclose(motion[on_mover], expected, atol=3e-4)
     still = (depth > 0) & (np.abs(points[..., 1]) < 1e-3)
     assert np.abs(motion[still]).max() < 1e-5
+
+
+def test_motion_of_water_that_rises(device: Device) -> None:
+    """The mesh itself changes: the specular layer's motion comes from where its vertices were in the last frame."""
+    rest = sheet("water", 1.5, 0.0)
+
+    def mesh_at(time_s: float) -> Mesh:
+        return replace(rest.mesh, positions_m=rest.mesh.positions_m + np.array([0.0, 0.2 * time_s, 0.0], np.float32))
+
+    water = WaterBody("water", rest.material, mesh_at)
+    scene = scene_of([plane("floor", 3.0, -1.0)], [], EYE, waters=(water,))
+    setup = FrameSetup.analyse(scene, SIZE, resolve_options(pick("none"), "draft", {}), transmissive_shadows=False)
+    graph = FrameGraph()
+    gbuffer.declare_opaque(graph, setup)
+    gbuffer.declare_specular(graph, setup)
+    runner = PlanRunner(device, graph.compile(outputs=("specular.motion", "specular.depth_m")), setup)
+    gpu = GpuScene(device)
+    gpu.keep_previous = True
+    camera = CameraState.make(EYE, SIZE, setup.scene_bounds_ws)
+    found = []
+    try:
+        for time_s in (0.0, 0.5, 0.5):
+            if len(found) == 2:
+                gpu.hold()
+            else:
+                gpu.update(scene.instances_at(time_s))
+            runner.run(FrameState(time_s, camera, camera, gpu, 1.0))
+            shape = (SIZE[1], SIZE[0], -1)
+            raw = np.frombuffer(runner.texture("specular.motion").read(), np.float16)
+            motion = raw.reshape(shape)[::-1].astype(np.float64)
+            depth = np.frombuffer(runner.texture("specular.depth_m").read(), np.float32).reshape(shape)[::-1, :, 0]
+            found.append((motion, depth.astype(np.float64)))
+    finally:
+        runner.release()
+        gpu.release()
+    origin, direction = pixel_rays(EYE, SIZE)
+    motion, depth = found[1]
+    seen = depth > 0
+    points = (origin + depth[..., None] * direction)[seen]
+    np.testing.assert_allclose(points[:, 1], 0.1, atol=1e-3)
+    expected = uv_of(points, EYE, SIZE) - uv_of(points - (0.0, 0.1, 0.0), EYE, SIZE)
+    assert seen.sum() > 1000 and np.abs(expected).max() > 0.02
+    np.testing.assert_allclose(motion[seen], expected, atol=3e-4)
+    for still in (found[0][0], found[2][0]):  # the first frame has no past; the third shows what the second did
+        assert np.abs(still).max() < 1e-6
+
+
+def test_motion_of_what_was_behind_the_eye_is_finite(device: Device) -> None:
+    turned = Camera.look_at((0.5, 1.5, 2.0), (1.0, 2.8, 4.0), yfov_rad=math.radians(50.0))
+    motion, _ = motion_of(device, scene_of([plane("floor", 30.0)], [], EYE), turned, {})
+    assert np.isfinite(motion).all() and np.abs(motion).max() <= 8.0
 
 
 # -- AOVs -------------------------------------------------------------------------------------------------------------

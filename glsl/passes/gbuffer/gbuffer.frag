@@ -111,6 +111,8 @@ void main() {
     o_emissive = vec4(emissive, 0.0);
 #endif
 #if HAS_MOTION
-    o_motion = 0.5 * (v_clip.xy / v_clip.w - v_previous_clip.xy / v_previous_clip.w);
+    // What stood behind the eye in the last frame has no place in its picture.
+    vec2 before = v_previous_clip.w > 0.0 ? v_previous_clip.xy / v_previous_clip.w : vec2(0.0);
+    o_motion = clamp(0.5 * (v_clip.xy / v_clip.w - before), -8.0, 8.0);
 #endif
 }

@@ -19,6 +19,9 @@ out vec2 v_uv;
 #endif
 #if HAS_MOTION
 uniform mat4 u_previous_clip_from_object;
+#if HAS_PREVIOUS_POSITION
+in vec3 in_previous_position;   // of a mesh that changed since the last frame
+#endif
 out vec4 v_clip;
 out vec4 v_previous_clip;
 #endif
@@ -38,6 +41,10 @@ void main() {
 #endif
 #if HAS_MOTION
     v_clip = gl_Position;
+#if HAS_PREVIOUS_POSITION
+    v_previous_clip = u_previous_clip_from_object * vec4(in_previous_position, 1.0);
+#else
     v_previous_clip = u_previous_clip_from_object * vec4(in_position, 1.0);
+#endif
 #endif
 }
