@@ -12,7 +12,7 @@ from glcaustics.caustics.registry import METHODS
 from glcaustics.optics.beams import peer_pool_field
 from glcaustics.scene.model import Instance, Mesh, Scene
 
-SAMPLES_OPTION = {"caustic_map": "caster_size"}  # method -> the option whose square is the number of light samples
+SAMPLE_SIDES = ("caster_size", "photons_per_side")  # options whose square is the number of light samples
 QUALITY = "medium"
 
 
@@ -24,12 +24,10 @@ def scaling_cases(name: str, methods: tuple[str, ...], *, quick: bool, backend: 
     meshes = (32, 64, 128) if quick else (32, 64, 128, 256, 512)
     found: list[tuple[str, float, Case]] = []
     for method in methods:
-        if method not in METHODS:
-            continue
         found += [
             ("time against pixels", side**2, Case(scene, target, method, QUALITY, side, backend)) for side in sides
         ]
-        if option := SAMPLES_OPTION.get(method):
+        if option := samples_option(method):
             found += [
                 ("time against light samples", n**2, Case(scene, target, method, QUALITY, 128, backend, {option: n}))
                 for n in samples
@@ -40,6 +38,11 @@ def scaling_cases(name: str, methods: tuple[str, ...], *, quick: bool, backend: 
                 for n in meshes
             ]
     return found
+
+
+def samples_option(method: str) -> str | None:
+    """The option that sets a method's number of light samples; None if it has none that is known here."""
+    return next((name for name in SAMPLE_SIDES if name in METHODS[method].ladder[QUALITY]), None)
 
 
 def wavy(scene: Scene, cells: int) -> Scene:

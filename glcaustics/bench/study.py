@@ -20,7 +20,7 @@ from glcaustics.bench.mitsuba_truth import Halves, mitsuba_reference
 from glcaustics.bench.peers import PtracerPeer, has_denoiser
 from glcaustics.bench.progress import Progress
 from glcaustics.bench.references import beam_reference
-from glcaustics.bench.scaling import SAMPLES_OPTION, scaling_cases
+from glcaustics.bench.scaling import samples_option, scaling_cases
 from glcaustics.bench.store import Arrays, Store, default_cache, digest, scene_key
 from glcaustics.bench.targets import Target, bench_scene, target_of
 from glcaustics.caustics.registry import METHODS
@@ -236,7 +236,7 @@ class Study:
             | {"fit": fit_power(*zip(*points, strict=True))}
             for (what, method), points in series.items()
         ]
-        missing = [m for m in self.plan.methods if m not in SAMPLES_OPTION]
+        missing = [m for m in self.plan.methods if samples_option(m) is None]
         if missing and self.plan.scaling_scene:
             self.notes.append(f"scaling with light samples is not measured for: {', '.join(missing)}")
         return found + self._error_against_time()
