@@ -4,6 +4,9 @@ and 2).
 
 from __future__ import annotations
 
+from typing import Any
+
+from glcaustics.gpu import Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes.frame import BELOW, BESIDE, FrameSetup, LightSetup, PassContext, ReceiverView
 from glcaustics.passes.geometry import DrawItem
@@ -118,8 +121,9 @@ def _draw_receiver(ctx: PassContext, receiver: ReceiverView, position: str, norm
     _draw_kind(ctx, receiver.view, program, target, ctx.frame.gpu.select(OpticalKind.DIFFUSE))
 
 
-# type: ignore[no-untyped-def]
-def _draw_kind(ctx, view: LightView, program, target, items: list[DrawItem], cull: str | None = None) -> None:
+def _draw_kind(
+    ctx: PassContext, view: LightView, program: Program, target: Any, items: list[DrawItem], cull: str | None = None
+) -> None:
     for matrix, viewport in zip(view.matrices, view.viewports(), strict=True):
         program.set(u_clip_from_world=matrix)
         ctx.frame.gpu.draw(program, target, items, viewport=viewport, cull=cull)
