@@ -1,6 +1,6 @@
 """The eye rays' solvers, each as one GLSL function, against float64 ray casting of analytic height fields.
 
-The G-buffer's planes are computed in float64 from the closed form, texel by texel, and uploaded: what is tested is the solver alone.
+The G-buffer's planes come from the closed form in float64, texel by texel: the solver alone is tested.
 Camera at the origin, looking down -z; surfaces are depths over the picture, as in `common/raster_ray.glsl`.
 """
 
@@ -20,8 +20,6 @@ from glcaustics.scene.model import Camera
 
 FloatArray = npt.NDArray[np.float64]
 Surface = Callable[[FloatArray], FloatArray]  # of points (..., 3): 0 on the surface, > 0 towards the eye
-    [FloatArray, FloatArray], FloatArray
-]  # F(x, y, z) as F(points (..., 3), _) = 0 on it, > 0 towards the eye
 
 SIZE = (192, 128)
 TAN_Y = 0.5
@@ -132,9 +130,7 @@ def texel_rays() -> tuple[FloatArray, FloatArray]:
     return np.stack([x, y], axis=-1), ray
 
 
-def cast(
-    f: Surface, o: FloatArray, d: FloatArray, length: float, steps: int = 600
-) -> FloatArray:
+def cast(f: Surface, o: FloatArray, d: FloatArray, length: float, steps: int = 600) -> FloatArray:
     """First root of f along o + t d, f > 0 at the start: scan and bisection in float64. inf where there is none."""
     found = np.full(o.shape[:-1], np.inf)
     lo = np.zeros(o.shape[:-1])
