@@ -106,6 +106,26 @@ def split_quads(vertices, quads):
     return np.concatenate(parts)
 
 
+def without_saddles(values, step):
+    """`values` with the nearest outside corner of every checkered cell face put inside, so that no edge has 4 faces."""
+    values = values.copy()
+    for _ in range(40):
+        found = 0
+        for axis in range(3):
+            v = np.moveaxis(values, axis, 0)  # a view: what is written to it lands in `values`
+            corners = [v[:, :-1, :-1], v[:, 1:, :-1], v[:, 1:, 1:], v[:, :-1, 1:]]
+            inside = [c < 0.0 for c in corners]
+            for k in (0, 1):
+                checkered = inside[k] & inside[k + 2] & ~inside[1 - k] & ~inside[3 - k]
+                found += int(checkered.sum())
+                first = checkered & (corners[1 - k] <= corners[3 - k])
+                corners[1 - k][first] = -1e-3 * step
+                corners[3 - k][checkered & ~first] = -1e-3 * step
+        if not found:
+            return values
+    raise RuntimeError("the field is too fine for this grid: saddles stay")
+
+
 def polygonise(field, low, high, step):
     """Mesh of field = 0 in the box: vertices (V, 3) on the surface, unit normals (V, 3) outward, triangles (T, 3).
 
@@ -115,7 +135,7 @@ def polygonise(field, low, high, step):
     counts = np.ceil((high - low) / step).astype(int) + 1
     axes = [low[i] + step * np.arange(counts[i]) for i in range(3)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    vertices, quads = surface_nets(field(grid), low, step)
+    vertices, quads = surface_nets(without_saddles(field(grid), step), low, step)
     for _ in range(6):  # Newton steps along the gradient, short ones so that neighbours keep their order
         slope = gradient(field, vertices)
         move = -field(vertices)[:, None] * slope / np.maximum((slope * slope).sum(axis=1, keepdims=True), 1e-6)

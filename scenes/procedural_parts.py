@@ -119,7 +119,7 @@ def boulder(radii, seed, roughness=0.18, detail=22):
     lattice[0], lattice[-1] = lattice[0].mean(0), lattice[-1].mean(0)
     lattice[:, -1] = lattice[:, 0]
     uv = np.stack([p / (2.0 * np.pi) * 3.0, t / np.pi * 1.5], axis=-1)
-    positions, _, uv, triangles = grid_part(lattice[:, ::-1], uv[:, ::-1])
+    positions, _, uv, triangles = grid_part(lattice, uv)
     corners = positions[triangles]
     face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     keep = np.linalg.norm(face, axis=1) > 1e-12

@@ -121,8 +121,8 @@ def make_ropes():
         at = net[5 + 10 * k]
         theta, phi = np.meshgrid(np.linspace(0, np.pi, 11), np.linspace(0, 2 * np.pi, 19), indexing="ij")
         unit = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], -1)
-        body = grid_part((0.062 * unit * [1.0, 0.85, 1.0])[:, ::-1])
-        normals = unit[:, ::-1].reshape(-1, 3)
+        body = grid_part(0.062 * unit * [1.0, 0.85, 1.0])
+        normals = unit.reshape(-1, 3)
         balls.append(placed((body[0], normals, body[2], body[3][distinct(body)]), shift=at + [0.0, 0.006, 0.0]))
     write_glb(HERE / "floats.glb", {"floats": joined(balls)})
 
@@ -211,7 +211,7 @@ def make_bed(width=2048):
 def make_textures():
     """rock.png, wood.png (both repeat), coral.png (dark foot to pale tip), buoy.png (bands)."""
     grain, patch = periodic(512, 80, 31, 0.02)[..., None], periodic(512, 8, 32)[..., None]
-    rock = np.array([0.63, 0.58, 0.52]) * (1.0 + 0.20 * grain + 0.22 * patch)
+    rock = np.array([0.56, 0.51, 0.46]) * (1.0 + 0.20 * grain + 0.22 * patch)
     crust = np.clip((patch + 0.5 * grain - 0.2) / 0.2, 0.0, 1.0)
     save_png(HERE / "rock.png", rock * (1.0 - 0.5 * crust) + 0.5 * crust * np.array([0.58, 0.46, 0.50]), 48)
     u, v = np.meshgrid((np.arange(512) + 0.5) / 512, (np.arange(512) + 0.5) / 512)

@@ -20,7 +20,8 @@ def kinds(name: str) -> set[OpticalKind]:
 
 
 def test_the_promised_scenes_exist() -> None:
-    assert {"pool", "peer-pool", "glass-sphere", "glass-bunny", "metal-ring", "dry-room"} <= set(NAMES)
+    early = {"pool", "peer-pool", "glass-sphere", "glass-bunny", "metal-ring", "dry-room"}
+    assert early | {"boat", "lagoon", "glass-statue"} <= set(NAMES)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -39,6 +40,11 @@ def test_geometry_is_sound(name: str) -> None:
         mesh = instance.mesh
         assert np.isfinite(mesh.positions_m).all() and np.isfinite(mesh.uv).all(), instance.name
         assert np.abs(np.linalg.norm(mesh.normals.astype(np.float64), axis=1) - 1.0).max() < 1e-5, instance.name
+        corners = mesh.positions_m[mesh.triangles].astype(np.float64)
+        face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal = mesh.normals[mesh.triangles].astype(np.float64).sum(axis=1)
+        agree = np.einsum("ti,ti->t", face, normal) > 0.0  # else both sides are lit wrongly
+        assert agree.mean() > 0.998, instance.name
         if instance.optical_kind in (OpticalKind.SOLID, OpticalKind.MIRROR):
             assert mesh.watertight, instance.name
         if mesh.watertight:
@@ -62,6 +68,8 @@ def test_the_optical_kinds_that_each_scene_is_for() -> None:
     assert kinds("peer-pool") == {OpticalKind.DIFFUSE, OpticalKind.INTERFACE}
     assert kinds("glass-sphere") == {OpticalKind.DIFFUSE, OpticalKind.SOLID}
     assert kinds("glass-bunny") == {OpticalKind.DIFFUSE, OpticalKind.SOLID}
+    assert kinds("boat") == kinds("lagoon") == {OpticalKind.DIFFUSE, OpticalKind.INTERFACE}
+    assert kinds("glass-statue") == {OpticalKind.DIFFUSE, OpticalKind.SOLID}
     assert kinds("metal-ring") == {OpticalKind.DIFFUSE, OpticalKind.MIRROR}
 
 
@@ -130,6 +138,78 @@ def test_the_bunny_is_one_absorbing_manifold() -> None:
     assert len(bunny.mesh.positions_m) - len(unique) + len(triangles) == 2  # Euler: one piece, no handle
     assert bunny.positions_ws()[:, 1].min() > 0.0 and np.ptp(bunny.positions_ws()[:, 1]) == pytest.approx(0.2, abs=1e-3)
     assert bunny.material.sigma_a.min() > 0.0
+
+
+def edges_of(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The undirected edges (E, 2) and how many triangles use each."""
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    unique, uses = np.unique(edges, axis=0, return_counts=True)
+    return unique, uses
+
+
+def test_the_statue_is_one_smooth_manifold_before_an_uneven_wall() -> None:
+    parts = {instance.name.split("/")[0]: instance for instance in load_scene("glass-statue").instances}
+    statue = parts["statue"]
+    triangles = statue.mesh.triangles.astype(np.int64)
+    assert 40_000 <= len(triangles) <= 80_000
+    assert (edges_of(triangles)[1] == 2).all()
+    positions = statue.positions_ws()
+    assert positions[:, 1].min() > 0.0 and np.ptp(positions[:, 1]) == pytest.approx(0.5, abs=1e-3)
+    wall = parts["wall"]
+    relief = wall.positions_ws()[:, 2]
+    assert np.ptp(relief) > 0.03 and np.std(relief) > 0.005  # metres of relief
+    assert wall.material.base_color_image is not None and parts["floor"].material.base_color_image is not None
+    assert relief.max() < positions[:, 2].min()  # behind the figure, not through it
+
+
+@pytest.mark.parametrize("name", ["boat", "lagoon"])
+def test_lakes_lie_in_their_beds(name: str) -> None:
+    """Water ends over ground that goes on, rises above it on the far side, and focuses near the bed; limits hold."""
+    scene = load_scene(name)
+    bed = next(i for i in scene.instances if i.name.startswith("bed")).positions_ws()
+    (water,) = scene.waters
+    everything = scene.instances_at(0.0)
+    sheet = everything[-1].positions_ws()
+    for axis in (0, 2):
+        assert bed[:, axis].min() < sheet[:, axis].min() and bed[:, axis].max() > sheet[:, axis].max()
+    level = float(water.world_from_object[1, 3])
+    far = bed[bed[:, 2] <= sheet[:, 2].min() + 0.1]
+    assert np.median(far[:, 1]) > sheet[:, 1].max()  # the far shore hides the water's edge
+    depth = level - np.median(bed[bed[:, 1] < level - 0.3][:, 1])
+    assert 0.7 < depth < 1.4
+    waves = surface_of(water).waves  # type: ignore[attr-defined]
+    sigma = math.sqrt(sum((w.amplitude_m * w.k**2) ** 2 for w in waves) / 2.0)  # rms curvature
+    assert 0.3 < sigma * depth * (water.material.ior - 1.0) / water.material.ior < 1.0
+    assert sum(len(i.mesh.triangles) for i in everything) < 250_000
+
+
+def test_the_boat_is_half_sunk_among_weeds() -> None:
+    scene = load_scene("boat")
+
+    def heights(name: str) -> np.ndarray:
+        return np.concatenate([i.positions_ws()[:, 1] for i in scene.instances if i.name.split("/")[0] == name])
+
+    hull = heights("hull")
+    assert hull.min() < -0.3 and hull.max() > 0.3  # stern under, bow out
+    weeds = [i for i in scene.instances if i.name.split("/")[0] == "weeds"]
+    assert len(weeds) >= 20 and sum(len(i.mesh.triangles) for i in weeds) > 30_000
+    tall = [np.ptp(i.positions_ws()[:, 1]) for i in weeds]
+    assert np.median(tall) > 0.6 and heights("weeds").max() < 0.05
+    assert heights("reeds").max() > 0.8 and heights("reeds").min() < -0.1  # these come through the surface
+
+
+def test_things_float_and_sink_in_the_lagoon() -> None:
+    scene = load_scene("lagoon")
+    spans: dict[str, list[float]] = {}
+    for instance in scene.instances:
+        y = instance.positions_ws()[:, 1]
+        low, high = spans.setdefault(instance.name.split("/")[0], [math.inf, -math.inf])
+        spans[instance.name.split("/")[0]] = [min(low, float(y.min())), max(high, float(y.max()))]
+    for afloat in ("buoy", "floats"):
+        assert spans[afloat][0] < 0.0 < spans[afloat][1], afloat
+    for sunken in ("staghorn", "brain", "table", "sponge"):
+        assert spans[sunken][1] < 0.0, sunken
+    assert spans["rocks"][1] > 0.05 and spans["log"][0] > -0.1
 
 
 @pytest.mark.parametrize("name", NAMES)
