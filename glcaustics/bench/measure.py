@@ -17,6 +17,7 @@ from glcaustics.bench.targets import Target, luminance
 from glcaustics.errors import UsageError
 from glcaustics.optics.pixels import box_filter
 from glcaustics.renderer import Renderer
+from glcaustics.scene.load import load_scene
 from glcaustics.scene.model import Scene
 
 FloatArray = npt.NDArray[np.float64]
@@ -109,6 +110,12 @@ def measure(case: Case, timing: Timing) -> tuple[dict[str, Any], FloatArray]:
             "gl_renderer": device.info["renderer"],
         }
         return row, luminance(frame.aov["caustic_irradiance"])
+
+
+def picture(name: str, method: str, quality: str, backend: str) -> npt.NDArray[np.uint8]:
+    """The built-in scene as its own camera sees it, absorption and all: (270, 480, 3) uint8, sRGB."""
+    with Renderer(load_scene(name), size=(480, 270), method=method, quality=quality, backend=backend) as renderer:
+        return renderer.render().ldr
 
 
 def _frame_ms(renderer: Renderer) -> float:

@@ -34,16 +34,22 @@ figcaption { font-size: 0.8rem; color: #444; max-width: 12.5rem; }
 """
 
 
-def page(report: Report, images: Mapping[str, FloatArray], plots: Mapping[str, bytes]) -> str:
+def page(
+    report: Report,
+    images: Mapping[str, FloatArray],
+    plots: Mapping[str, bytes],
+    pictures: Mapping[str, npt.NDArray[np.uint8]],
+) -> str:
     """The whole page.
 
     Args:
         images: irradiance maps (P, P) by "SCENE reference" and "SCENE METHOD STEP".
         plots: PNG by file name.
+        pictures: (H, W, 3) uint8 by scene, as its camera sees it.
     """
     body = [_head(report), _validation(report)]
     for scene in report["plan"]["scenes"]:
-        body.append(_scene(report, scene, images, plots))
+        body.append(_scene(report, scene, images, plots, pictures[scene]))
     body += [_curves(report, plots), _passes(report), _notes(report)]
     title = "glcaustics: error against run time"
     return (
@@ -95,7 +101,13 @@ def _validation(report: Report) -> str:
 # ---------------------------------------------------------------- a scene
 
 
-def _scene(report: Report, scene: str, images: Mapping[str, FloatArray], plots: Mapping[str, bytes]) -> str:
+def _scene(
+    report: Report,
+    scene: str,
+    images: Mapping[str, FloatArray],
+    plots: Mapping[str, bytes],
+    picture: npt.NDArray[np.uint8],
+) -> str:
     rows = judged(report, scene)
     reference = images[f"{scene} reference"]
     mean = float(reference.mean())
@@ -109,8 +121,10 @@ def _scene(report: Report, scene: str, images: Mapping[str, FloatArray], plots: 
         figures.append(_figure(_png(display(images[name], mean)), caption))
         figures.append(_figure(_png(_difference(images[name] - reference, mean)), f"its error, {_errors(row)}"))
     plot = _image(plots[f"error-{scene}.png"], "plot", f"error against time, {scene}")
+    shown = _image(_png(picture / 255.0), "plot", scene)
     return (
-        f"<h2>{html.escape(scene)}</h2><p><small>{html.escape(source['source'])}; noise {source['noise']:.2%} of the "
+        f"<h2>{html.escape(scene)}</h2>{shown}"
+        f"<p><small>{html.escape(source['source'])}; noise {source['noise']:.2%} of the "
         f"mean. Error maps: red is too bright, blue too dark, full colour at {ERROR_SPAN:g} times the mean. "
         f"Foci (pixels above {SINGULAR:g} times the mean, and their neighbours): {source['singular_pixels']:.2%} of "
         f"the pixels, {source['singular_flux']:.1%} of the flux."

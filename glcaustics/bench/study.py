@@ -15,7 +15,7 @@ import numpy.typing as npt
 import glcaustics
 from glcaustics.bench.analysis import fit_power, pareto
 from glcaustics.bench.machine import code_key, commit, machine, versions
-from glcaustics.bench.measure import Case, Timing, errors, measure, reduced, regular
+from glcaustics.bench.measure import Case, Timing, errors, measure, picture, reduced, regular
 from glcaustics.bench.mitsuba_truth import Halves, mitsuba_reference
 from glcaustics.bench.peers import PtracerPeer, has_denoiser
 from glcaustics.bench.progress import Progress
@@ -90,6 +90,7 @@ class Study:
     command: str = ""
     rows: list[dict[str, Any]] = field(default_factory=list)
     images: dict[str, FloatArray] = field(default_factory=dict)
+    pictures: dict[str, npt.NDArray[np.uint8]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -115,6 +116,7 @@ class Study:
             if self.plan.validate:
                 validation.append(self._validation(scene, target))
             self._methods(scene, target, truth)
+            self._picture(scene)
             if self.peers:
                 self._peers(scene, target, truth)
         scaling = self._scaling()
@@ -124,7 +126,7 @@ class Study:
     def _count(self) -> int:
         p = self.plan
         ours = (len(p.methods) + 1) * len(p.qualities) * len(p.sizes)
-        each = 1 + bool(p.validate) + ours + (len(p.photons) if self.peers else 0)
+        each = 2 + bool(p.validate) + ours + (len(p.photons) if self.peers else 0)
         return each * len(p.scenes) + (len(list(self._scaling_cases())) if p.scaling_scene else 0)
 
     # ------------------------------------------------------------ cells
@@ -191,6 +193,16 @@ class Study:
             if judged and case.pixels == self.plan.largest:
                 self.images[f"{case.scene.name} {case.method} {case.quality}"] = arrays["image"]
         return dict(row)
+
+    def _picture(self, scene: Scene) -> None:
+        method, quality = self.plan.methods[0], self.plan.qualities[-1]
+        key = digest("picture", self._code, scene_key(scene), scene.name, method, quality)
+
+        def make() -> tuple[dict[str, Any], Arrays]:
+            return {}, {"ldr": picture(scene.name, method, quality, self.plan.backend)}
+
+        _, arrays = self._cell(f"{scene.name}: picture", key, make)
+        self.pictures[scene.name] = arrays["ldr"]
 
     # ------------------------------------------------------------ peers
 

@@ -63,7 +63,7 @@ def _measure(args: argparse.Namespace) -> dict[str, Any]:
     (folder / "plots").mkdir(exist_ok=True)
     for name, png in drawn.items():
         write_bytes(folder / "plots" / name, png)
-    write_text(folder / "report.html", page(report, study.images, drawn))
+    write_text(folder / "report.html", page(report, study.images, drawn, study.pictures))
     write_text(folder / "report.json", json.dumps(report, indent=1, allow_nan=False) + "\n")
     for v in report["validation"]:
         if not v["agree"]:

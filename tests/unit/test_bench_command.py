@@ -122,10 +122,11 @@ def test_the_checkout_has_the_module(stored: Path) -> None:
 
 def test_the_page_is_self_contained_and_escaped() -> None:
     maps = {name: np.full((8, 8), 1.0) for name in ("pool reference", "pool caustic_map draft")}
-    text = page(document(), maps, {"error-pool.png": b"PNG", "time-against-pixels.png": b"PNG"})
+    picture = {"pool": np.zeros((9, 16, 3), np.uint8)}
+    text = page(document(), maps, {"error-pool.png": b"PNG", "time-against-pixels.png": b"PNG"}, picture)
     assert not re.findall(r"(?:src|href)=\"(?!data:)", text)
     assert "&lt;cpu&gt;" in text and "<cpu>" not in text
-    assert text.count("<img") == 5, "reference, map, its error, and two plots"
+    assert text.count("<img") == 6, "the scene, reference, map, its error, and two plots"
     assert '<span class="bad">no</span>' in text and "a note" in text
 
 
