@@ -249,9 +249,10 @@ def _mean_normal(instance: Instance) -> FloatArray:
 
 
 def _near_m(world_from_camera: FloatArray, lens: tuple[float, float], boxes_ws: FloatArray) -> float:
-    """How far the near plane may stand off, metres: before the nearest box (N, 2, 3) that reaches in front of the camera.
+    """How far off the near plane may stand, metres: before the nearest box (N, 2, 3) that reaches in front of the eye.
 
-    The scene's size alone would push the plane past everything that stands on a huge ground. Inside of a box its own size decides.
+    The scene's size alone would push the plane past everything that stands on a huge ground. Inside of a box its own
+    size decides.
     """
     eye, forward = world_from_camera[:3, 3], -world_from_camera[:3, 2]
     low, high = boxes_ws[:, 0], boxes_ws[:, 1]

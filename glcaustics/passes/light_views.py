@@ -189,8 +189,8 @@ def fit_view(
         texels: the texture has about `texels`^2 texels.
         depth_points_ws: (M, 3); what the depth range must hold, if more than the points (occluders).
         size: fixes the texture's size, else it follows the aspect ratio of the window.
-        boxes_ws: (N, 2, 3), a box an object: how near to a lamp surfaces come. Their vertices do not tell: those of a large
-            ground are all far away.
+        boxes_ws: (N, 2, 3), a box an object: how near to a lamp surfaces come. Their vertices do not tell: those of a
+            large ground are all far away.
     """
     depths_ws = points_ws if depth_points_ws is None else depth_points_ws
     if light.kind is LightKind.DIRECTIONAL:
@@ -201,7 +201,7 @@ def fit_view(
 
 
 def nearest_box_m(position_ws: FloatArray, boxes_ws: FloatArray) -> float:
-    """Least distance from a point to what is in some boxes (N, 2, 3), metres; within a box, a thousandth of its diagonal."""
+    """Least distance from a point to what is in some boxes (N, 2, 3), metres; within one, 1e-3 of its diagonal."""
     low, high = boxes_ws[:, 0], boxes_ws[:, 1]
     away = np.linalg.norm(np.maximum(np.maximum(low - position_ws, position_ws - high), 0.0), axis=1)
     return float(np.maximum(away, 1e-3 * np.linalg.norm(high - low, axis=1) * (away == 0.0)).min())

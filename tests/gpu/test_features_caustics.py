@@ -177,6 +177,24 @@ def test_slab_of_glass_transmits_by_fresnel_and_beer_lambert(theta: float, clear
         np.testing.assert_allclose(total, 4.0 * passed * np.exp(-material.sigma_a * thick), rtol=0.006)
 
 
+def test_cube_of_glass_by_closed_form() -> None:
+    """Slanted light enters a cube by its top and one side. From the top all of it reaches the floor, some by a total
+    reflection at the far side; from the side, what meets the bottom is totally reflected and leaves upwards."""
+    size, theta = 0.6, math.radians(40.0)
+    cube = box("cube", (size, size, size), (0.0, 0.5, 0.0), GLASS)
+    scene = scene_of([plane("floor", 4.0), cube], [sun(40.0)], from_above(2.0))
+    (solve,) = shoot(scene, (96, 96), options=NO_REFLECTION).stats["solves"]
+    by_top = size**2 * math.cos(theta) * float(transmittance_dielectric(math.cos(theta), 1.0, 1.5)) ** 2
+    by_side = size**2 * math.sin(theta) * float(transmittance_dielectric(math.sin(theta), 1.0, 1.5)) ** 2
+    straight = 1.0 - math.tan(
+        math.asin(math.cos(theta) / 1.5)
+    )  # share of the side's light that meets the far side first
+    print(solve["flux_landed"], by_top + straight * by_side, solve["flux_left_the_scene"], (1 - straight) * by_side)
+    assert solve["flux_landed"] == pytest.approx(by_top + straight * by_side, rel=0.01)
+    assert solve["flux_left_the_scene"] == pytest.approx((1.0 - straight) * by_side, rel=0.03)
+    assert solve["flux_lost_share"] < 0.01
+
+
 # -- the three estimates ----------------------------------------------------------------------------------------------
 
 

@@ -62,6 +62,7 @@ vec3 texel_flux(GlcView view, vec3 p_ws, vec3 d, float n_dot_l) {
 // alone give no answer, and after a total reflection, when the way out may be through the front.
 GlcHit leave_inside(GlcView view, vec3 o, vec3 d, float t_max) {
     GlcHit hit = GlcHit(0.0, o, -d, 0, GLC_LEFT);
+    t_max += 4.0 * glc_texel_width(view, o);   // where the solid fills its box, a texel still counts as inside at the box's face
     float t_in = 0.0;
     bool entered = false;
     for (int i = 1; i <= u_march_steps; ++i) {
