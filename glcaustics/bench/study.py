@@ -71,7 +71,7 @@ QUICK = replace(
     photons=(1 << 15, 1 << 17, 1 << 19),
     validate=1 << 19,
     cells=320,
-    timing=Timing(3, 5, 0.5),
+    timing=Timing(3, 30, 0.5),
     quick=True,
 )
 

@@ -70,7 +70,7 @@ def test_the_same_report_has_no_regression_on_a_slower_machine() -> None:
     ("changed", "words"),
     [
         (row("caustic_map", 10.0, 0.125), "relative RMSE"),
-        (row("caustic_map", 19.0, 0.1), "times the frame without caustics"),
+        (row("caustic_map", 19.0, 0.1), "1.90 times as slow"),
         (row("caustic_map", 10.0) | {"errors": {"non_finite": 0.01}}, "not finite"),
     ],
 )
@@ -78,6 +78,18 @@ def test_a_regression_is_told(changed: dict[str, Any], words: str) -> None:
     old = report(row("none", 4.0), row("caustic_map", 10.0, 0.1))
     worse, compared = regressions(old, report(row("none", 4.0), changed))
     assert compared == 1 and len(worse) == 1 and words in worse[0]
+
+
+def test_one_slow_row_of_three_counts_only_when_it_is_far_off() -> None:
+    scenes = ("a", "b", "c")
+
+    def run(*ms: float) -> dict[str, Any]:
+        mine = [row("caustic_map", t, 0.1, scene=s) for s, t in zip(scenes, ms, strict=True)]
+        return report(*(row("none", 4.0, scene=s) for s in scenes), *mine)
+
+    assert regressions(run(10.0, 10.0, 10.0), run(10.0, 25.0, 10.0)) == ([], 3)
+    worse, _ = regressions(run(10.0, 10.0, 10.0), run(10.0, 40.0, 10.0))
+    assert len(worse) == 1 and worse[0].startswith("b glcaustics caustic_map low 64px: 10.00 times")
 
 
 def test_rows_of_other_sizes_and_peers_are_not_compared() -> None:
