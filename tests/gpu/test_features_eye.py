@@ -37,16 +37,14 @@ def test_floor_under_flat_water(theta: float, absorbing: bool) -> None:
     scene = scene_of(
         [plane("floor", 3.0, -depth, GREY), sheet("water", 2.5, 0.0, material)], [sun(0.0, 100.0)], eye_at(theta)
     )
-    image = shoot(scene, (129, 129), quality="high", specular_view=True, aovs=()).image.astype(np.float64)
+    image = shoot(scene, (129, 129), quality="medium", specular_view=True, aovs=()).image.astype(np.float64)
     sin_t = math.sin(math.radians(theta)) / 1.333
     path = depth / math.sqrt(1 - sin_t**2)
     irradiance = 100.0 * transmitted(0.0, 1.333) * np.exp(-material.sigma_a * depth)
     radiance = transmitted(math.radians(theta), 1.333) * RHO * irradiance / (math.pi * 1.333**2)
     radiance *= np.exp(-material.sigma_a * path)
     print(theta, absorbing, image[64, 64] / radiance)
-    # the slanted way is found by a few steps of a fixed point: what is left of its error shows where the water is dark
-    rtol = 0.05 if absorbing and theta > 60.0 else 0.01
-    np.testing.assert_allclose(image[56:73, 56:73].mean(axis=(0, 1)), radiance, rtol=rtol)
+    np.testing.assert_allclose(image[56:73, 56:73].mean(axis=(0, 1)), radiance, rtol=0.01)
 
 
 @pytest.mark.parametrize("theta", [0.0, 35.0])
