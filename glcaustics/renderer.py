@@ -360,7 +360,8 @@ class Renderer:
         runner = self._prepared(time)
         frame = self._frame_state(time, jitter_px)
         runner.run(frame)
-        self._previous = (frame.camera, {i.instance.name: i.world_from_object for i in self._gpu.items})
+        if jitter_px == (0.0, 0.0):  # a shifted sample is no frame of its own: motion is counted from frame to frame
+            self._previous = (frame.camera, {i.instance.name: i.world_from_object for i in self._gpu.items})
         if self._target is not None:
             self._copy_to_target(runner)
         return runner
