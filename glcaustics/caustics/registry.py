@@ -5,11 +5,13 @@ from __future__ import annotations
 import difflib
 
 from glcaustics.caustics.caustic_map import CausticMap
+from glcaustics.caustics.displaced_mesh import DisplacedMesh
 from glcaustics.caustics.method import CausticsMethod
 from glcaustics.errors import UsageError
 
 METHODS: dict[str, type[CausticsMethod]] = {
     "caustic_map": CausticMap,
+    "displaced_mesh": DisplacedMesh,
 }
 
 NONE = "none"  # caustics off: light passes through water and glass as if they were not there

@@ -160,6 +160,18 @@ class Device(Resources):
         array = self._no_buffers(program)
         self.draw(array, program, fbo, mode="points", vertices=count, blend=blend, viewport=viewport, point_size=True)
 
+    def draw_triangles(
+        self,
+        program: Program,
+        fbo: moderngl.Framebuffer,
+        count: int,
+        *,
+        blend: str | None = None,
+        viewport: tuple[int, int, int, int] | None = None,
+    ) -> None:
+        """`count` triangles without buffers, depth test or culling: the vertex shader places them by gl_VertexID."""
+        self.draw(self._no_buffers(program), program, fbo, vertices=3 * count, blend=blend, viewport=viewport)
+
     def _no_buffers(self, program: Program) -> moderngl.VertexArray:
         array = self._bufferless.get(program)
         if array is None:

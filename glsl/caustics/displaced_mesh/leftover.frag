@@ -1,0 +1,74 @@
+// What the triangles leave out of a vertex's flux: all of it beside a cell that is not drawn. It becomes a splat, spread as the
+// light map spreads it, at least as wide as the map's own pixel filter: no flux is dropped at an edge, and a fold that texels cannot
+// resolve is anti-aliased. In the mesh the vertex fades to nothing there, so that both add up to one sheet without a seam.
+#include "caustics/displaced_mesh/grid.glsl"
+#include "common/optics.glsl"
+
+uniform sampler2D t_vertex;
+uniform sampler2D t_axes;
+uniform sampler2D t_weight;
+uniform sampler2D t_flux;
+uniform float u_sigma;       // standard deviation of a whole texel's splat in units of the distance to its neighbour
+uniform float u_max_radius;  // texels
+
+layout(location = 0) out vec4 o_splat;  // xy: centre in texels of the map; z: radius, texels (0: nothing left over); w: face
+layout(location = 1) out vec4 o_conic;  // xyz: inverse covariance (a, b, c); w: share of the flux / integral of the kernel
+layout(location = 2) out vec4 o_drawn;  // rgb: flux of the vertex in the triangles, W or lm; w: signed determinant
+
+const float PIXEL_VARIANCE = 0.2;   // texels^2: the map's own filter
+const float CUTOFF = 7.0;           // squared Mahalanobis radius where the kernel ends; SPLAT_CUTOFF in splat.frag
+
+// Share of a vertex's flux that the triangles around it draw: they fade out towards an edge or an unresolved cell.
+float drawn_share(ivec2 texel) {
+    float share = 1.0;
+    for (int i = 0; i < 4; ++i) {
+        ivec2 cell = texel - 1 + ivec2(i & 1, i >> 1);
+        share = min(share, all(greaterThanEqual(cell, ivec2(0))) ? texelFetch(t_weight, cell, 0).x : 0.0);
+    }
+    return share;
+}
+
+// Linear interpolation lies above a convex function, by h^2 f'' / 12 in the mean: the determinant is lowered by as much, or every
+// focus between two vertices would come out too dark.
+float interpolant(ivec2 texel, vec4 vertex) {
+    ivec2 size = textureSize(t_vertex, 0);
+    if (any(equal(texel, ivec2(0))) || any(equal(texel, size - 1))) return vertex.z;
+    vec4 left = texelFetch(t_vertex, texel - ivec2(1, 0), 0), right = texelFetch(t_vertex, texel + ivec2(1, 0), 0);
+    vec4 down = texelFetch(t_vertex, texel - ivec2(0, 1), 0), up = texelFetch(t_vertex, texel + ivec2(0, 1), 0);
+    bool joined = (int(left.w) & LINK_RIGHT) != 0 && (int(down.w) & LINK_UP) != 0
+               && (int(vertex.w) & (LINK_RIGHT | LINK_UP)) == (LINK_RIGHT | LINK_UP);
+    if (!joined) return vertex.z;
+    float bend = left.z + right.z + down.z + up.z - 4.0 * vertex.z;
+    float limit = 0.5 * abs(vertex.z);
+    return vertex.z - clamp(bend / 12.0, -limit, limit);
+}
+
+void main() {
+    o_splat = vec4(0.0);
+    o_conic = vec4(0.0);
+    o_drawn = vec4(0.0, 0.0, 0.0, 1.0);
+    ivec2 texel = ivec2(gl_FragCoord.xy);
+    vec4 vertex = texelFetch(t_vertex, texel, 0);
+    if (vertex.w == 0.0) return;
+    float share = drawn_share(texel);
+    o_drawn = vec4(share * texelFetch(t_flux, texel, 0).rgb, interpolant(texel, vertex));
+    if (share == 1.0) return;
+    vec4 projected = texelFetch(t_projected, texel, 0);
+    vec4 axes = texelFetch(t_axes, texel, 0);
+    vec2 a = axes.xy, b = axes.zw, centre = vertex.xy;
+    vec2 alone = vec2(a == vec2(0.0), b == vec2(0.0)) * projected.w;
+    vec3 c = vec3(a.x * a.x + b.x * b.x, a.x * a.y + b.x * b.y, a.y * a.y + b.y * b.y) + vec3(1.0, 0.0, 1.0) * dot(alone, alone);
+    c = c * (u_sigma * u_sigma) + vec3(PIXEL_VARIANCE, 0.0, PIXEL_VARIANCE);
+    float half_trace = 0.5 * (c.x + c.z);
+    float largest = half_trace + sqrt(max(half_trace * half_trace - (c.x * c.z - c.y * c.y), 0.0));
+    float radius = sqrt(CUTOFF * largest);
+    float shrink = min(1.0, u_max_radius / radius);  // keeps its flux and its shape
+    c *= shrink * shrink;
+    float det = max(c.x * c.z - c.y * c.y, 1e-8);
+    float integral = 2.0 * GLC_PI * sqrt(det) * (1.0 - exp(-0.5 * CUTOFF) * (1.0 + 0.5 * CUTOFF));
+#if RECEIVER_FACES == 1
+    centre += 0.5 * u_receiver_size;
+#endif
+    o_splat = vec4(centre, radius * shrink, float(grid_face(projected)));
+    o_conic = vec4(c.z / det, -c.y / det, c.x / det, (1.0 - share) / integral);
+}
