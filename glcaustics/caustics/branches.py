@@ -44,6 +44,7 @@ class Branch:
     channels: tuple[float, float, float] = (1.0, 1.0, 1.0)
     channel: int = 1
     suffix: str = ""
+    zone: str = ""
 
     @property
     def view(self) -> str:
@@ -51,15 +52,21 @@ class Branch:
         return BELOW if self.kind == INTERFACE else BESIDE
 
     @property
+    def map_view(self) -> str:
+        """The receiver view whose map it is drawn into: `view`, or its core."""
+        return self.view + self.zone
+
+    @property
     def words(self) -> str:
         return WORDS[self.kind] + self.suffix.replace(".", " ")
 
     def pass_name(self, stage: str) -> str:
-        return f"{self.method}.{stage}.{self.kind}{self.suffix}@{self.light_index}"
+        return f"{self.method}.{stage}.{self.kind}{self.suffix}{self.zone}@{self.light_index}"
 
     def resource(self, name: str) -> str:
         """A resource of this branch: "displaced_mesh.interface.cell@0"."""
-        return f"{self.method}.{self.kind}{self.suffix}.{name}@{self.light_index}"
+        zone = "" if name in ("landing_ws", "flux") else self.zone  # one solve serves both maps
+        return f"{self.method}.{self.kind}{self.suffix}{zone}.{name}@{self.light_index}"
 
     @property
     def landing(self) -> str:

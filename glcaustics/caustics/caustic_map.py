@@ -104,7 +104,7 @@ class CausticMap(LightMapMethod):
     # -- execution ----------------------------------------------------------------------------------------------------
 
     def _footprint(self, ctx: PassContext, light: LightSetup, branch: Branch) -> None:
-        view = light.receivers[branch.view].view
+        view = light.receivers[branch.map_view].view
         assert light.caster is not None
         turn = 2.0 if branch.kind == REFLECT else 0.5
         defines = {"RECEIVER_FACES": view.faces, "CASTER_FACES": light.caster.faces, "TURN": turn}

@@ -1,8 +1,8 @@
 """Displaced caustic mesh (Mayer, Assarsson, Sintorn 2026): a grid over the casters' view, drawn where its light lands.
 
-Beyond the paper: any caster mesh, solids and mirrors; exact areas; sheets that overlap are summed; the signed determinant
-of the light map, interpolated, instead of one area ratio a triangle; what triangles cannot show (edges, slivers, the last
-texel before a fold) is splatted with its flux, so that none is dropped; cube maps; every loss of the solve counted.
+Beyond the paper: any caster mesh, solids and mirrors; exact areas; sheets that overlap are summed; the signed
+determinant of the light map, interpolated, not one area ratio a triangle; what triangles cannot show (edges, slivers,
+the last texel before a fold) is splatted with its flux: none is dropped; cube maps; every loss of the solve counted.
 """
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ class DisplacedMesh(LightMapMethod):
     def _program(ctx: PassContext, light: LightSetup, branch: Branch, stage: str) -> Program:
         """The program of a stage, with what it needs of the views."""
         assert light.caster is not None
-        view = light.receivers[branch.view].view
+        view = light.receivers[branch.map_view].view
         defines = {"RECEIVER_FACES": view.faces}
         if stage == "vertex":
             defines["CASTER_FACES"] = light.caster.faces
@@ -223,7 +223,7 @@ class DisplacedMesh(LightMapMethod):
 def _unit(light: LightSetup, branch: Branch) -> float:
     """Texels of the map that a texel of the casters' view covers where light goes straight on."""
     assert light.caster is not None
-    return math.sqrt(light.caster.texel_measure / light.receivers[branch.view].view.texel_measure)
+    return math.sqrt(light.caster.texel_measure / light.receivers[branch.map_view].view.texel_measure)
 
 
 def _drawn_statistics(branch: Branch, runner: PlanRunner) -> dict[str, Any]:

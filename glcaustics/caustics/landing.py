@@ -14,7 +14,7 @@ import numpy as np
 from glcaustics.caustics.branches import branches_of, read_rgba32f
 from glcaustics.gpu import Device
 from glcaustics.graph import FrameGraph
-from glcaustics.passes.frame import FrameSetup, FrameState, LightSetup, receiver_views
+from glcaustics.passes.frame import CORE, FrameSetup, FrameState, LightSetup, ReceiverView, receiver_views
 from glcaustics.passes.geometry import boxes_of, points_of
 from glcaustics.passes.light_views import LightView, fit_view
 from glcaustics.passes.runner import PlanRunner
@@ -24,6 +24,13 @@ if TYPE_CHECKING:
     from glcaustics.caustics.light_solve import LightMapMethod
 
 COARSE_CASTER, COARSE_MAP = 128, 384
+CORE_CUTS = (
+    0.01,
+    0.04,
+    0.15,
+)  # of the flux that may fall outside of a core, on each of its four sides; core within core
+CORE_AREA = 0.1  # of the window's area that a core may have at most: else one map serves as well
+CORE_BORDER = 0.1  # of a core's texels on each side
 LOST_SHARE = 2.5e-4  # of the flux that may fall outside of the window, on each of its four sides
 AIR = {False: 0.02, True: 0.06}  # border of the window; more where the water moves
 
@@ -57,7 +64,40 @@ def fit_receivers(
                 view = _window(seen_from, points, weights, texels, setup.is_animated, receivers, boxes)
                 coarse_light.receivers[name] = replace(coarse_light.receivers[name], view=view)
     light.receivers = coarse_light.receivers
+    for name, (points, weights) in landed.items():
+        around = coarse_light.receivers[name]
+        for cut in CORE_CUTS:
+            core = _core(around, points, weights, cut, int(setup.options["map_size"]), receivers, boxes)
+            if core is not None:
+                light.receivers[core.name] = around = core
     return shares
+
+
+def _core(
+    around: ReceiverView,
+    points: FloatArray,
+    weights: FloatArray,
+    cut: float,
+    texels: int,
+    receivers: FloatArray,
+    boxes: FloatArray,
+) -> ReceiverView | None:
+    """A view of the part of a window in which most of the light lands, where that part is small: the focus of a lens."""
+    if len(points) == 0 or around.view.faces == 6:
+        return None
+    u, v = _window_coordinates(around.view, points)
+    keep = _inner(u, weights, cut) & _inner(v, weights, cut)
+    if not keep.any() or float(np.ptp(u[keep]) * np.ptp(v[keep])) > CORE_AREA * 4.0:
+        return None
+    kept = points[keep]
+    border = CORE_BORDER * texels
+    depths = np.concatenate([receivers, kept])
+    view = fit_view(around.view.light, kept, texels, depth_points_ws=depths, boxes_ws=boxes, border_texels=border)
+    if view.faces == 6:
+        return None
+    # The border holds the splats that reach into the inner part from outside of it.
+    inner = (1.0 - 0.9 * 2.0 * border / view.size[0], 1.0 - 0.9 * 2.0 * border / view.size[1])
+    return ReceiverView(around.name + CORE, view, around.clip_plane, inner)
 
 
 def _coarse_solve(
@@ -115,13 +155,12 @@ def _window_coordinates(view: LightView, points: FloatArray) -> tuple[FloatArray
     return clip[:, 0] / w, clip[:, 1] / w
 
 
-def _inner(values: FloatArray, weights: FloatArray) -> Any:
+def _inner(values: FloatArray, weights: FloatArray, cut: float = LOST_SHARE) -> Any:
     """Mask of the values between the two weighted quantiles."""
     order = np.argsort(values)
     cumulative = np.cumsum(weights[order])
     last = len(order) - 1
     low, high = (
-        values[order[min(int(np.searchsorted(cumulative, share * cumulative[-1])), last)]]
-        for share in (LOST_SHARE, 1.0 - LOST_SHARE)
+        values[order[min(int(np.searchsorted(cumulative, share * cumulative[-1])), last)]] for share in (cut, 1.0 - cut)
     )
     return (values >= low) & (values <= high)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import moderngl
@@ -17,7 +18,7 @@ from glcaustics.errors import UsageError
 from glcaustics.gpu import Device
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes import light_view
-from glcaustics.passes.frame import FrameSetup, FrameState, LightSetup, PassContext, ReceiverView
+from glcaustics.passes.frame import CORE, FrameSetup, FrameState, LightSetup, PassContext, ReceiverView
 from glcaustics.passes.light_views import light_uniforms
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.scene.model import OpticalKind
@@ -131,7 +132,8 @@ class LightMapMethod(CausticsMethod):
                 continue
             self.declare_solves(graph, setup, light, self.branches(setup, light))
             for receiver in self._views(setup, light):
-                branches = [b for b in self.branches(setup, light) if b.view == receiver.name]
+                zone = receiver.name.removeprefix(receiver.base)
+                branches = [replace(b, zone=zone) for b in self.branches(setup, light) if b.view == receiver.base]
                 self.declare_map(graph, setup, light, receiver, branches)
                 maps.append((light, receiver))
         for name, because in self._left_out:
@@ -154,13 +156,13 @@ class LightMapMethod(CausticsMethod):
     def _views(self, setup: FrameSetup, light: LightSetup) -> list[ReceiverView]:
         """The receiver views in which some branch of this light lands."""
         used = {branch.view for branch in self.branches(setup, light)}
-        return [receiver for name, receiver in light.receivers.items() if name in used]
+        return [receiver for receiver in light.receivers.values() if receiver.base in used]
 
     def declare_solves(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, branches: list[Branch]) -> None:
         """Light views and landing points of one light; also what the coarse fit runs."""
         light_view.declare_caster(graph, setup, light)
         for receiver in light.receivers.values():
-            if any(branch.view == receiver.name for branch in branches):
+            if any(branch.view == receiver.base for branch in branches):
                 light_view.declare_receiver(graph, setup, light, receiver)
         if OpticalKind.SOLID in setup.kinds():
             light_view.declare_caster_back(graph, setup, light)
@@ -273,7 +275,19 @@ class LightMapMethod(CausticsMethod):
         target = ctx.target(IRRADIANCE)
         target.clear(0.0, 0.0, 0.0, 0.0)
         for light, receiver in maps:
-            program = ctx.device.program(f"{SHADERS}/gather", {"RECEIVER_FACES": receiver.view.faces})
+            core = light.receivers.get(receiver.name + CORE)
+            program = ctx.device.program(
+                f"{SHADERS}/gather",
+                {
+                    "RECEIVER_FACES": receiver.view.faces,
+                    "HAS_CORE": int(core is not None),
+                    "IS_CORE": int(receiver.inner_ndc is not None),
+                },
+            )
+            if core is not None:
+                program.set(u_core_clip_from_world=core.view.matrices[0], u_core_inner_ndc=core.inner_ndc)
+            if receiver.inner_ndc is not None:
+                program.set(u_inner_ndc=receiver.inner_ndc)
             program.set_all(
                 {
                     **ctx.frame.uniforms(),

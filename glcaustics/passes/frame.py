@@ -31,12 +31,22 @@ class ReceiverView:
 
     `view.light` may be a virtual light: under water the light comes along the refracted direction (directional), or
     from the surface's image of the lamp (point, spot). Seen from the real light the deck would hide what it does reach.
+    `inner_ndc`: of a core, the half extents of the part that counts, in clip space; light beyond it is looked up in the map around.
     `clip_plane`: (a, b, c, d); receivers where a x + b y + c z + d < 0 (above the water) are not drawn.
     """
 
     name: str
     view: LightView
     clip_plane: tuple[float, float, float, float] | None = None
+    inner_ndc: tuple[float, float] | None = None
+
+    @property
+    def base(self) -> str:
+        """BESIDE or BELOW: the view of which this is a core (or a core's core), or itself."""
+        return self.name.split(CORE)[0]
+
+
+CORE = ".core"  # suffix of the view over the small part of a window in which most of the light lands
 
 
 @dataclass(eq=False)

@@ -102,7 +102,7 @@ def declare_receiver(graph: FrameGraph, setup: FrameSetup, light: LightSetup, re
             },
             lambda ctx: _draw_receiver(ctx, receiver, position, normal, depth),
             always_writes=(depth,),
-            note=f"opaque surfaces where caustics can land, seen from {RECEIVER_WORDS[receiver.name]}",
+            note=f"opaque surfaces where caustics can land, seen from {RECEIVER_WORDS[receiver.base]}",
         )
     )
 

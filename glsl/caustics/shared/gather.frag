@@ -61,6 +61,20 @@ vec3 on_plane(vec2 uv, vec3 p, vec3 n, float depth_m) {
     return abs(d_n) > 0.05 ? q + ray * (dot(p - q, n) / d_n) : q;
 }
 
+// Where most of the light lands in a small part of the window, that part (the core) has a map of its own, at its own scale.
+#if HAS_CORE
+uniform mat4 u_core_clip_from_world;
+uniform vec2 u_core_inner_ndc;
+#endif
+#if IS_CORE
+uniform vec2 u_inner_ndc;
+#endif
+
+bool in_window(mat4 clip_from_world, vec2 inner_ndc, vec3 p_ws) {
+    vec4 clip = clip_from_world * vec4(p_ws, 1.0);
+    return clip.w > 0.0 && all(lessThan(abs(clip.xy), inner_ndc * clip.w));
+}
+
 void main() {
     o_irradiance = vec4(0.0);
     float depth_m = texelFetch(t_depth_m, ivec2(gl_FragCoord.xy), 0).r;
@@ -68,6 +82,12 @@ void main() {
     vec3 p = glc_camera_position_ws(v_uv, depth_m);
     vec3 n = texelFetch(t_normal_ws, ivec2(gl_FragCoord.xy), 0).xyz;
     GlcView view = glc_receiver_view();
+#if HAS_CORE
+    if (in_window(u_core_clip_from_world, u_core_inner_ndc, p)) return;
+#endif
+#if IS_CORE
+    if (!in_window(u_receiver_clip_from_world, u_inner_ndc, p)) return;
+#endif
     vec3 centre = glc_view_project(view, p);
     if (!glc_view_inside(view, centre)) return;
     // A pixel that covers several texels takes their mean, or fold lines one texel wide would flicker and lose energy.
