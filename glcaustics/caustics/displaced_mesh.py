@@ -50,7 +50,7 @@ class DisplacedMesh(LightMapMethod):
     defaults: ClassVar[Mapping[str, Any]] = {
         **LightMapMethod.defaults,
         "fold_width": 2.0,
-        "change": 0.25,
+        "change": 0.1,
         "sharpen": True,
     }
     ranges: ClassVar[Mapping[str, tuple[float, float]]] = {
@@ -93,11 +93,11 @@ class DisplacedMesh(LightMapMethod):
             )
 
     def _declare_grid(self, graph: FrameGraph, light: LightSetup, branch: Branch) -> None:
-        """Four small passes over the grid of vertices."""
+        """Five small passes over the grid of vertices."""
         assert light.caster is not None
         size = light.caster.size
-        projected, vertex, axes, cell, weight, drawn = (
-            branch.resource(n) for n in ("projected", "vertex", "axes", "cell", "weight", "drawn")
+        projected, exact, vertex, axes, cell, weight, drawn = (
+            branch.resource(n) for n in ("projected", "exact", "vertex", "axes", "cell", "weight", "drawn")
         )
 
         def add(stage: str, writes: tuple[str, ...], reads: tuple[str, ...], unit: str, note: str) -> None:
@@ -114,7 +114,8 @@ class DisplacedMesh(LightMapMethod):
         caster = (light.resource("caster.position_ws"), light.resource("caster.normal_ws"))
         landing = branch.landing
         add("project", (projected,), (landing, *caster), "texel", "landing points in texels of the map")
-        add("vertex", (vertex, axes), (projected, landing), "texel", "signed determinant of the light map")
+        add("vertex", (exact, axes), (projected, landing), "texel", "signed determinant of the light map")
+        add("interpolant", (vertex,), (exact,), "texel", "determinant made fit to be interpolated")
         add(
             "cell",
             (cell, weight),
@@ -139,6 +140,7 @@ class DisplacedMesh(LightMapMethod):
         textures: dict[str, tuple[str, ...]] = {
             "project": (),
             "vertex": ("projected",),
+            "interpolant": ("exact",),
             "cell": ("projected", "vertex"),
             "leftover": ("projected", "vertex", "axes", "weight"),
         }
@@ -156,7 +158,7 @@ class DisplacedMesh(LightMapMethod):
             program.set(
                 u_fold_width=float(ctx.setup.options["fold_width"]), u_change=float(ctx.setup.options["change"])
             )
-        else:
+        elif stage == "leftover":
             program.set(
                 t_flux=ctx.texture(branch.flux),
                 u_sigma=SPLAT_SIGMA,

@@ -7,7 +7,7 @@ uniform float u_fold_width;  // texels: a cell wider than this is drawn in any c
 uniform float u_change;      // relative change of the density over a texel that triangles may show
 
 layout(location = 0) out vec4 o_cell;   // of both triangles: largest density, and the factor that keeps its flux; 0: not drawn
-layout(location = 1) out vec4 o_weight; // x: share that triangles take, 0 (unresolved, or an edge runs through) .. 1
+layout(location = 1) out vec4 o_weight; // x: share that triangles take, 0 (unresolved, or an edge runs through) .. 1; y: flux drawn / flux
 
 const float DENSITY_CAP = 1.5;  // times flux / area of the triangle: methods.md 3
 
@@ -18,7 +18,8 @@ float signed_area(vec3 a, vec3 b, vec3 c) { return 0.5 * cross2(b.xy - a.xy, c.x
 
 // Cap of the density (vertices per texel^2), and the factor by which min(1/|det|, cap) is scaled so that the triangle holds its
 // flux exactly (quadrature of degree 3 over a triangle: Zienkiewicz 1971, table 8.2).
-vec2 densities(vec3 a, vec3 b, vec3 c) {
+// `drawn` gathers the share of the flux that is drawn then.
+vec2 densities(vec3 a, vec3 b, vec3 c, inout float drawn) {
     float ratio = 0.5 / max(abs(signed_area(a, b, c)), 1e-6);
     float cap = DENSITY_CAP * ratio;
     float mean = 0.0;
@@ -31,8 +32,10 @@ vec2 densities(vec3 a, vec3 b, vec3 c) {
     float low = min(det.x, min(det.y, det.z)), high = max(det.x, max(det.y, det.z));
     // Where the determinant hardly changes, 1/|det| is more exact than the triangle's area.
     float smallest = low * high > 0.0 ? min(abs(low), abs(high)) : 0.0;
-    float uneven = smoothstep(1.5, 3.0, max(abs(low), abs(high)) / max(smallest, 1e-12));
-    return vec2(cap, mix(1.0, ratio / mean, uneven));
+    float uneven = smoothstep(2.0, 6.0, max(abs(low), abs(high)) / max(smallest, 1e-12));
+    float factor = mix(1.0, ratio / mean, uneven);
+    drawn += 0.5 * factor * mean / ratio;
+    return vec2(cap, factor);
 }
 
 // Is there a fold ahead, where the determinant changes its sign? Looked for down its slope, as far as that predicts and on.
@@ -62,7 +65,7 @@ float resolved_share(ivec2 texel, vec3 a, vec3 b, vec3 c, vec3 d) {
     float low = min(min(a.z, b.z), min(c.z, d.z)), high = max(max(a.z, b.z), max(c.z, d.z));
     float smallest = low * high > 0.0 ? min(abs(low), abs(high)) : 0.0;
     float change = (high - low) / max(smallest * width, 1e-12);
-    float share = 1.0 - smoothstep(0.75 * u_change, 1.5 * u_change, change);
+    float share = 1.0 - smoothstep(0.5 * u_change, 2.0 * u_change, change);
     share = max(share, smoothstep(u_fold_width, 2.0 * u_fold_width, width));
     if (share == 1.0 || smallest == 0.0) return share;
     vec2 slope = 0.5 * vec2(b.z - a.z + d.z - c.z, c.z - a.z + d.z - b.z);
@@ -93,5 +96,5 @@ void main() {
 #endif
     o_weight.x = resolved_share(texel, a, b, c, d);
     if (o_weight.x == 0.0) return;
-    o_cell = vec4(densities(a, b, c), densities(b, d, c));
+    o_cell = vec4(densities(a, b, c, o_weight.y), densities(b, d, c, o_weight.y));
 }

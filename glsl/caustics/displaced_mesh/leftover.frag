@@ -18,29 +18,19 @@ layout(location = 2) out vec4 o_drawn;  // rgb: flux of the vertex in the triang
 const float PIXEL_VARIANCE = 0.2;   // texels^2: the map's own filter
 const float CUTOFF = 7.0;           // squared Mahalanobis radius where the kernel ends; SPLAT_CUTOFF in splat.frag
 
-// Share of a vertex's flux that the triangles around it draw: they fade out towards an edge or an unresolved cell.
-float drawn_share(ivec2 texel) {
-    float share = 1.0;
+// Share of a vertex's flux that the triangles around it draw: they fade out towards an edge or an unresolved cell. `excess`: by how
+// much they would draw too much; taken out over four cells, since a factor a triangle would show the triangles.
+float drawn_share(ivec2 texel, out float excess) {
+    float share = 1.0, sum = 0.0, count = 0.0;
     for (int i = 0; i < 4; ++i) {
         ivec2 cell = texel - 1 + ivec2(i & 1, i >> 1);
-        share = min(share, all(greaterThanEqual(cell, ivec2(0))) ? texelFetch(t_weight, cell, 0).x : 0.0);
+        vec4 weight = all(greaterThanEqual(cell, ivec2(0))) ? texelFetch(t_weight, cell, 0) : vec4(0.0);
+        share = min(share, weight.x);
+        sum += weight.y;
+        count += weight.y > 0.0 ? 1.0 : 0.0;
     }
+    excess = count > 0.0 ? sum / count : 1.0;
     return share;
-}
-
-// Linear interpolation lies above a convex function, by h^2 f'' / 12 in the mean: the determinant is lowered by as much, or every
-// focus between two vertices would come out too dark.
-float interpolant(ivec2 texel, vec4 vertex) {
-    ivec2 size = textureSize(t_vertex, 0);
-    if (any(equal(texel, ivec2(0))) || any(equal(texel, size - 1))) return vertex.z;
-    vec4 left = texelFetch(t_vertex, texel - ivec2(1, 0), 0), right = texelFetch(t_vertex, texel + ivec2(1, 0), 0);
-    vec4 down = texelFetch(t_vertex, texel - ivec2(0, 1), 0), up = texelFetch(t_vertex, texel + ivec2(0, 1), 0);
-    bool joined = (int(left.w) & LINK_RIGHT) != 0 && (int(down.w) & LINK_UP) != 0
-               && (int(vertex.w) & (LINK_RIGHT | LINK_UP)) == (LINK_RIGHT | LINK_UP);
-    if (!joined) return vertex.z;
-    float bend = left.z + right.z + down.z + up.z - 4.0 * vertex.z;
-    float limit = 0.5 * abs(vertex.z);
-    return vertex.z - clamp(bend / 12.0, -limit, limit);
 }
 
 void main() {
@@ -50,8 +40,9 @@ void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
     vec4 vertex = texelFetch(t_vertex, texel, 0);
     if (vertex.w == 0.0) return;
-    float share = drawn_share(texel);
-    o_drawn = vec4(share * texelFetch(t_flux, texel, 0).rgb, interpolant(texel, vertex));
+    float excess;
+    float share = drawn_share(texel, excess);
+    o_drawn = vec4(share / excess * texelFetch(t_flux, texel, 0).rgb, vertex.z);
     if (share == 1.0) return;
     vec4 projected = texelFetch(t_projected, texel, 0);
     vec4 axes = texelFetch(t_axes, texel, 0);
