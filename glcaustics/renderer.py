@@ -196,7 +196,7 @@ def plan_frame(
     Raises:
         UsageError: unknown method, quality or AOV.
     """
-    chosen = pick(_named(scene, method))
+    chosen = pick(_named(scene, method), scene)
     setup = FrameSetup.analyse(
         scene, size, resolve_options(chosen, quality, {}), transmissive_shadows=chosen is not None
     )
@@ -265,7 +265,7 @@ class Renderer:
                 f"the target framebuffer is {shown}, the picture {self.size[0]}x{self.size[1]}",
                 remedy="make both the same size",
             )
-        self._chosen = pick(self.method_name)
+        self._chosen = pick(self.method_name, scene)
         resolved = resolve_options(self._chosen, quality, options or {})
         self._method = self._chosen() if self._chosen else None
         self._setup = FrameSetup.analyse(

@@ -8,6 +8,8 @@ from glcaustics.caustics.caustic_map import CausticMap
 from glcaustics.caustics.displaced_mesh import DisplacedMesh
 from glcaustics.caustics.method import CausticsMethod
 from glcaustics.errors import UsageError
+from glcaustics.passes.geometry import TRANSMISSIVE_KINDS
+from glcaustics.scene.model import Scene
 
 METHODS: dict[str, type[CausticsMethod]] = {
     "caustic_map": CausticMap,
@@ -18,8 +20,18 @@ NONE = "none"  # caustics off: light passes through water and glass as if they w
 AUTO = "auto"
 
 
-def pick(name: str) -> type[CausticsMethod] | None:
-    """The method of a name; None for "none". "auto" takes caustic_map, so far the only one.
+def best_for(scene: Scene) -> type[CausticsMethod]:
+    """What "auto" takes: the displaced mesh where light is refracted, the caustic map where it is only reflected.
+
+    Measured on one machine in one run, light passes on llvmpipe, relative RMSE: peer-pool 0.0087 in 152 ms against 0.016 in
+    1065 ms; a glass sphere 0.0008 in 392 ms against 0.0019 in 482 ms; a mirror's nephroid 0.013 in 122 ms against 87 ms.
+    """
+    kinds = {instance.optical_kind for instance in scene.instances_at(0.0)}
+    return DisplacedMesh if kinds & set(TRANSMISSIVE_KINDS) else CausticMap
+
+
+def pick(name: str, scene: Scene) -> type[CausticsMethod] | None:
+    """The method of a name; None for "none". "auto" takes what is best for the scene.
 
     Raises:
         UsageError: no such method.
@@ -27,7 +39,7 @@ def pick(name: str) -> type[CausticsMethod] | None:
     if name == NONE:
         return None
     if name == AUTO:
-        return CausticMap
+        return best_for(scene)
     if name not in METHODS:
         near = difflib.get_close_matches(name, [*METHODS, NONE, AUTO], n=1)
         raise UsageError(
