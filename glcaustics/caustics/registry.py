@@ -30,8 +30,8 @@ def best_for(scene: Scene) -> type[CausticsMethod]:
     return DisplacedMesh if kinds & set(TRANSMISSIVE_KINDS) else CausticMap
 
 
-def pick(name: str, scene: Scene) -> type[CausticsMethod] | None:
-    """The method of a name; None for "none". "auto" takes what is best for the scene.
+def pick(name: str, scene: Scene | None = None) -> type[CausticsMethod] | None:
+    """The method of a name; None for "none". "auto" takes what is best for the scene (any scene: the mesh).
 
     Raises:
         UsageError: no such method.
@@ -39,7 +39,7 @@ def pick(name: str, scene: Scene) -> type[CausticsMethod] | None:
     if name == NONE:
         return None
     if name == AUTO:
-        return best_for(scene)
+        return best_for(scene) if scene is not None else DisplacedMesh
     if name not in METHODS:
         near = difflib.get_close_matches(name, [*METHODS, NONE, AUTO], n=1)
         raise UsageError(
