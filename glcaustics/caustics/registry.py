@@ -23,8 +23,9 @@ AUTO = "auto"
 def best_for(scene: Scene) -> type[CausticsMethod]:
     """What "auto" takes: the displaced mesh where light is refracted, the caustic map where it is only reflected.
 
-    Measured on one machine in one run, light passes on llvmpipe, relative RMSE: peer-pool 0.0087 in 152 ms against 0.016 in
-    1065 ms; a glass sphere 0.0008 in 392 ms against 0.0019 in 482 ms; a mirror's nephroid 0.013 in 122 ms against 87 ms.
+    Relative RMSE and the light passes' time, one run on llvmpipe: peer-pool 0.0087 in 152 ms (medium) against 0.016 in
+    1065 ms (high); a glass sphere 0.0008 in 392 ms against 0.0019 in 482 ms; a mirror's nephroid 0.013 in 122 against
+    0.014 in 87 ms.
     """
     kinds = {instance.optical_kind for instance in scene.instances_at(0.0)}
     return DisplacedMesh if kinds & set(TRANSMISSIVE_KINDS) else CausticMap
