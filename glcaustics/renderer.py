@@ -225,6 +225,8 @@ class Renderer:
         seed: of everything random.
         options: single options on top of the ladder, see `glcaustics methods`.
         stats: read solves back and count them.
+        keep: draw what the camera does not enter (shadow maps, caustic maps) anew only when the scene has moved; off, every
+            frame pays for all of it, as the benchmarks want.
         shader_root: another folder of shaders than the project's own, for tests.
 
     Raises:
@@ -246,6 +248,7 @@ class Renderer:
         seed: int = 0,
         options: Mapping[str, Any] | None = None,
         stats: bool = True,
+        keep: bool = True,
         shader_root: Path | None = None,
     ) -> None:
         self.scene = scene
@@ -257,6 +260,7 @@ class Renderer:
         if min(self.size) < 1:
             shown = "x".join(str(n) for n in self.size)
             raise UsageError(f"the picture's size is {shown}", where="size", remedy="give at least 1x1 pixels")
+        self._keep = keep
         self._target = target
         self._present: moderngl.Framebuffer | None = None
         if target is not None and target.size != self.size:
@@ -394,7 +398,7 @@ class Renderer:
             outputs = tuple(dict.fromkeys((*outputs, *self._method.stats_resources())))
         _, kept = self._declared.graph.compile(outputs=outputs).kept()
         plan = self._declared.graph.compile(outputs=tuple(dict.fromkeys((*outputs, *kept))))
-        self._runner = PlanRunner(self.device, plan, self._setup)
+        self._runner = PlanRunner(self.device, plan, self._setup, keep=self._keep)
         self._gpu.keep_previous = bool({"gbuffer.motion", "specular.motion"} & plan.slots.keys())
         return self._runner
 

@@ -16,6 +16,7 @@ from glcaustics.bench.mitsuba_truth import Halves
 from glcaustics.bench.targets import Target, luminance
 from glcaustics.errors import UsageError
 from glcaustics.optics.pixels import box_filter
+from glcaustics.caustics.registry import METHODS
 from glcaustics.renderer import Renderer
 from glcaustics.scene.load import load_scene
 from glcaustics.scene.model import Scene
@@ -66,6 +67,14 @@ def summary(values: list[float], kind: str) -> dict[str, Any]:
     }
 
 
+def same_paths(case: Case) -> dict[str, Any]:
+    """Options with which a method follows the same paths as the truth: two interfaces of a solid, no reflection inside."""
+    method = METHODS.get(case.method)
+    if method is not None and case.target.interfaces == 2 and "internal_bounces" in method.ladder[case.quality]:
+        return {"internal_bounces": 0}
+    return {}
+
+
 def measure(case: Case, timing: Timing) -> tuple[dict[str, Any], FloatArray]:
     """A row of the report without its errors, and the irradiance (P, P), luminance, at the target.
 
@@ -73,6 +82,7 @@ def measure(case: Case, timing: Timing) -> tuple[dict[str, Any], FloatArray]:
     the wall clock up to `finish`; on a GPU the sum of its passes' timer queries.
     """
     scene = replace(case.scene, camera=case.target.camera(), camera_at=None)
+    options = {**same_paths(case), **case.options}
     begin = time.perf_counter()
     renderer = Renderer(
         scene,
@@ -82,7 +92,8 @@ def measure(case: Case, timing: Timing) -> tuple[dict[str, Any], FloatArray]:
         backend=case.backend,
         aovs=("caustic_irradiance",),
         specular_view=False,
-        options=case.options,
+        options=options,
+        keep=False,
     )
     with renderer:
         renderer.render()

@@ -6,13 +6,17 @@ bracketing fallback for what the fixed point misses, refraction and reflection o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, ClassVar
+
+import numpy as np
 
 from glcaustics.caustics.branches import REFLECT, Branch
 from glcaustics.caustics.light_solve import SPLAT_SIGMA, LightMapMethod
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext, ReceiverView
+from glcaustics.passes.frame import CORE, FrameSetup, LightSetup, PassContext, ReceiverView
 
 SHADERS = "caustics/caustic_map"
 
@@ -31,6 +35,7 @@ class CausticMap(LightMapMethod):
             "march_steps": 12,
             "gather_taps": 1,
             "internal_bounces": 0,
+            "max_radius": 8.0,
         },
         "low": {
             "caster_size": 160,
@@ -39,6 +44,7 @@ class CausticMap(LightMapMethod):
             "march_steps": 16,
             "gather_taps": 1,
             "internal_bounces": 1,
+            "max_radius": 12.0,
         },
         "medium": {
             "caster_size": 288,
@@ -47,6 +53,7 @@ class CausticMap(LightMapMethod):
             "march_steps": 24,
             "gather_taps": 2,
             "internal_bounces": 2,
+            "max_radius": 16.0,
         },
         "high": {
             "caster_size": 768,
@@ -55,6 +62,7 @@ class CausticMap(LightMapMethod):
             "march_steps": 48,
             "gather_taps": 4,
             "internal_bounces": 4,
+            "max_radius": 32.0,
         },
         "reference": {
             "caster_size": 2048,
@@ -63,8 +71,10 @@ class CausticMap(LightMapMethod):
             "march_steps": 96,
             "gather_taps": 6,
             "internal_bounces": 8,
+            "max_radius": 48.0,
         },
     }
+    cores_add = True
     option_help: ClassVar[Mapping[str, str]] = {
         **LightMapMethod.option_help,
         "naive_flux": "the paper's N.L / V flux instead of the exact one, as a baseline (true, false)",
@@ -96,7 +106,12 @@ class CausticMap(LightMapMethod):
                 branch.pass_name("footprint"),
                 {branch.splat: TextureDesc("rgba32f", size, "texel"), branch.conic: TextureDesc("rgba32f", size)},
                 lambda ctx: self._footprint(ctx, light, branch),
-                reads=(branch.landing, light.resource("caster.position_ws"), light.resource("caster.normal_ws")),
+                reads=(
+                    branch.landing,
+                    light.resource("caster.position_ws"),
+                    light.resource("caster.normal_ws"),
+                    *((replace(branch, zone="").splat,) if branch.zone else ()),
+                ),
                 note="how far it is spread there",
             )
         )
@@ -107,8 +122,25 @@ class CausticMap(LightMapMethod):
         view = light.receivers[branch.map_view].view
         assert light.caster is not None
         turn = 2.0 if branch.kind == REFLECT else 0.5
-        defines = {"RECEIVER_FACES": view.faces, "CASTER_FACES": light.caster.faces, "TURN": turn}
+        tier = branch.zone.count(CORE)
+        cores = [r for r in light.receivers.values() if r.base == branch.view and r.name != r.base] if tier == 0 else []
+        defines = {
+            "RECEIVER_FACES": view.faces,
+            "CASTER_FACES": light.caster.faces,
+            "CORES": len(cores),
+            "TIER": tier,
+            "TURN": turn,
+        }
         program = ctx.device.program(f"{SHADERS}/footprint", defines)
+        if cores:
+            texels = [math.sqrt(view.texel_measure / core.view.texel_measure) for core in cores]
+            program.set(
+                u_core_clip_from_world=np.array([core.view.matrices[0] for core in cores]),
+                u_core_texels=np.array(texels),
+                u_core_size=np.array([core.view.size for core in cores], np.float64),
+            )
+        if tier > 0:
+            program.set(t_tiers=ctx.texture(replace(branch, zone="").splat))
         program.set_all(
             {
                 "t_landing": ctx.texture(branch.landing),

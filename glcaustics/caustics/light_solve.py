@@ -45,6 +45,9 @@ class LightMapMethod(CausticsMethod):
         "max_radius": (2, 64),
     }
     flags: ClassVar[tuple[str, ...]] = ("reflect", "dispersion")
+    cores_add: ClassVar[bool] = (
+        False  # True: each sample is drawn in one map, and maps are summed; False: the finest counts
+    )
     option_help: ClassVar[Mapping[str, str]] = {
         "caster_size": "the casters' light view has about this^2 texels, one light sample each (8..8192)",
         "map_size": "the caustic map has about this^2 texels (8..8192)",
@@ -275,18 +278,19 @@ class LightMapMethod(CausticsMethod):
         target = ctx.target(IRRADIANCE)
         target.clear(0.0, 0.0, 0.0, 0.0)
         for light, receiver in maps:
-            core = light.receivers.get(receiver.name + CORE)
+            core = None if self.cores_add else light.receivers.get(receiver.name + CORE)
+            is_core = receiver.inner_ndc is not None and not self.cores_add
             program = ctx.device.program(
                 f"{SHADERS}/gather",
                 {
                     "RECEIVER_FACES": receiver.view.faces,
                     "HAS_CORE": int(core is not None),
-                    "IS_CORE": int(receiver.inner_ndc is not None),
+                    "IS_CORE": int(is_core),
                 },
             )
             if core is not None:
                 program.set(u_core_clip_from_world=core.view.matrices[0], u_core_inner_ndc=core.inner_ndc)
-            if receiver.inner_ndc is not None:
+            if is_core:
                 program.set(u_inner_ndc=receiver.inner_ndc)
             program.set_all(
                 {

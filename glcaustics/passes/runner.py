@@ -10,9 +10,13 @@ from glcaustics.passes.frame import FrameSetup, FrameState, PassContext
 
 
 class PlanRunner:
-    """The textures and framebuffers of one plan."""
+    """The textures and framebuffers of one plan.
 
-    def __init__(self, device: Device, plan: Plan, setup: FrameSetup) -> None:
+    Args:
+        keep: what the camera does not enter is drawn anew only when the scene has moved.
+    """
+
+    def __init__(self, device: Device, plan: Plan, setup: FrameSetup, *, keep: bool = True) -> None:
         self.device = device
         self.plan = plan
         self.setup = setup
@@ -23,7 +27,7 @@ class PlanRunner:
         self._textures = {resource: self._slots[slot] for resource, slot in plan.slots.items()}
         self._framebuffers: dict[tuple[int, ...], moderngl.Framebuffer] = {}
         steps, frontier = plan.kept()
-        self._still = steps if set(frontier) <= set(plan.outputs) else frozenset()
+        self._still = steps if keep and set(frontier) <= set(plan.outputs) else frozenset()
         self._still_version: int | None = None
         self.skipped: frozenset[str] = frozenset()
 
@@ -31,8 +35,7 @@ class PlanRunner:
         return self.device.texture(desc.size, desc.format, filter=desc.filter, compare=desc.compare, label=label)
 
     def run(self, frame: FrameState) -> None:
-        """Execute every step; those that the camera does not enter only when the scene has moved since they last ran.
-        """
+        """Execute every step; those that the camera does not enter only when the scene has moved since they last ran."""
         same = self._still_version == frame.gpu.version
         self.skipped = self._still if same else frozenset()
         self._still_version = frame.gpu.version

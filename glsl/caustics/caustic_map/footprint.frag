@@ -10,11 +10,35 @@ uniform sampler2D t_caster_normal;
 uniform float u_sigma;          // standard deviation of a splat in units of the distance to its neighbour
 uniform float u_max_radius;     // texels
 
-layout(location = 0) out vec4 o_splat;  // x, y: centre in texels of the map; z: radius, texels (0: no splat); w: face
-layout(location = 1) out vec4 o_conic;  // xyz: inverse covariance (a, b, c); w: 1 / integral of the kernel
-
 const float GLC_PIXEL_VARIANCE = 0.2;   // texels^2: the map's own filter
 const float GLC_CUTOFF = 7.0;           // squared Mahalanobis radius where the kernel ends; SPLAT_CUTOFF in splat.frag
+
+#if CORES > 0
+// The maps of this window's cores, the finest last. A splat is drawn once, in the finest map that holds it whole and where it is small:
+// so light that is spread wide costs few texels, and a focus is sharp.
+uniform mat4 u_core_clip_from_world[CORES];
+uniform float u_core_texels[CORES];      // texels of the core's map in one of this map
+uniform vec2 u_core_size[CORES];         // texels
+
+const float GLC_CORE_RADIUS = 10.0;      // texels of the core: a wider splat goes to a coarser map
+
+int tier_of(vec3 p_ws, float variance) {
+    for (int k = CORES - 1; k >= 0; --k) {
+        float radius = sqrt(GLC_CUTOFF * (variance * u_core_texels[k] * u_core_texels[k] + GLC_PIXEL_VARIANCE));
+        vec4 clip = u_core_clip_from_world[k] * vec4(p_ws, 1.0);
+        vec2 reach = 1.0 - 2.0 * (radius + 2.0) / u_core_size[k];
+        if (radius < GLC_CORE_RADIUS && clip.w > 0.0 && all(lessThan(abs(clip.xy), reach * clip.w))) return k + 1;
+    }
+    return 0;
+}
+#endif
+#if TIER > 0
+uniform sampler2D t_tiers;               // what the window's own pass decided: w = tier
+#endif
+
+layout(location = 0) out vec4 o_splat;  // x, y: centre in texels of the map; z: radius, texels (0: no splat); w: face of a cube, or the core that draws it (then without radius)
+layout(location = 1) out vec4 o_conic;  // xyz: inverse covariance (a, b, c); w: 1 / integral of the kernel
+
 
 // TURN: how much a ray turns with the normal: 2 reflected, about a half refracted.
 
@@ -56,6 +80,9 @@ void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
     vec4 here = texelFetch(t_landing, texel, 0);
     if (here.w <= 0.0) return;
+#if TIER > 0
+    if (texelFetch(t_tiers, texel, 0).w != float(TIER)) return;
+#endif
     GlcView view = glc_receiver_view();
     int face = glc_view_face(view, here.xyz);
     vec3 centre = glc_view_project_on(view, here.xyz, face);
@@ -65,7 +92,13 @@ void main() {
     float spread = TURN * bend * length(here.xyz - caster.xyz) / max(glc_texel_width(view, here.xyz), 1e-30);
     vec3 c = axis_covariance(view, centre, face, here, caster.w, texel, ivec2(1, 0), spread * spread)
            + axis_covariance(view, centre, face, here, caster.w, texel, ivec2(0, 1), spread * spread);
-    c = c * (u_sigma * u_sigma) + vec3(GLC_PIXEL_VARIANCE, 0.0, GLC_PIXEL_VARIANCE);
+    c *= u_sigma * u_sigma;
+#if CORES > 0
+    float half_trace = 0.5 * (c.x + c.z);
+    int tier = tier_of(here.xyz, half_trace + sqrt(max(half_trace * half_trace - (c.x * c.z - c.y * c.y), 0.0)));
+    if (tier > 0) { o_splat.w = float(tier); return; }
+#endif
+    c += vec3(GLC_PIXEL_VARIANCE, 0.0, GLC_PIXEL_VARIANCE);
     float mean = 0.5 * (c.x + c.z);
     float largest = mean + sqrt(max(mean * mean - (c.x * c.z - c.y * c.y), 0.0));
     float radius = sqrt(GLC_CUTOFF * largest);
