@@ -34,8 +34,8 @@ WORDS = {REFLECT: "reflected", INTERFACE: "refracted", SOLID: "twice refracted"}
 class Branch:
     """Light of one source that takes one kind of path, of all colour channels or of one, as a method follows it.
 
-    `kind`: REFLECT (mirrors, and what water and glass throw back), INTERFACE (through an open surface), SOLID (in and out again).
-    `channels`: 1 for the colour channels carried; `channel`: the one whose index of refraction counts.
+    `kind`: REFLECT (mirrors, and what water and glass throw back), INTERFACE (through an open surface), SOLID (in and
+    out again). `channels`: 1 for the colour channels carried; `channel`: the one whose index of refraction counts.
     """
 
     method: str

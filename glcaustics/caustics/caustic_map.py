@@ -1,7 +1,8 @@
 """Caustics mapping (Shah, Konttinen, Pattanaik 2007): one sample a light-space texel, splatted where its light lands.
 
-Beyond the paper: exact flux of a texel, exact Fresnel, splats that follow the local stretch, views fitted to where the light lands, a
-bracketing fallback for what the fixed point misses, refraction and reflection of the same texel, and every loss counted.
+Beyond the paper: exact flux of a texel, exact Fresnel, splats that follow the local stretch, views fitted to where the
+light lands, a bracketing fallback for what the fixed point misses, refraction and reflection of the same texel, and
+every loss counted.
 """
 
 from __future__ import annotations

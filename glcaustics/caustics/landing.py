@@ -1,7 +1,9 @@
-"""Where a light's caustics land, found by sending a coarse light through the scene once: the window of the receiver view.
+"""Where a light's caustics land, found by sending a coarse light through the scene once: the window of the receiver
+view.
 
-A caustic map fitted to the receivers as a whole wastes its texels on where no caustic falls; the light frustum of published code
-leaves three quarters unused. Two coarse rounds, each with its own read-back, before the first frame; none in a frame.
+A caustic map fitted to the receivers as a whole wastes its texels on where no caustic falls; the light frustum of
+published code leaves three quarters unused. Two coarse rounds, each with its own read-back, before the first frame;
+none in a frame.
 """
 
 from __future__ import annotations

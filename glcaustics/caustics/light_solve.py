@@ -1,5 +1,6 @@
-"""What the methods share that displace light samples in light space: where the light of each texel of the casters' view lands, the
-caustic maps that it is collected in, their look-up at the camera's pixels, and the statistics of the solves."""
+"""What the methods share that displace light samples in light space: where the light of each texel of the casters' view
+lands, the caustic maps that it is collected in, their look-up at the camera's pixels, and the statistics of the
+solves."""
 
 from __future__ import annotations
 
@@ -26,6 +27,7 @@ from glcaustics.scene.model import OpticalKind
 SHADERS = "caustics/shared"
 ESTIMATES = {"fixed_point": 0, "newton_fd": 1, "hybrid": 2}
 NEGLIGIBLE_SHARE = 5e-4  # a branch that brings less of a light's flux to the receivers is left out, and said so
+CORE_TAPS = 32  # on each side of a pixel: few pixels see a core, and those few may each see many of its texels
 SPLAT_SIGMA = 0.62  # of the distance to the neighbour: least blur at which a regular grid of splats is flat to 0.2 %
 
 
@@ -300,7 +302,7 @@ class LightMapMethod(CausticsMethod):
                     "t_normal_ws": ctx.texture("gbuffer.normal_ws"),
                     "t_receiver_position": ctx.texture(light.resource(f"receiver.{receiver.name}.position_ws")),
                     "t_flux": ctx.texture(self.map_resource(light, receiver)),
-                    "u_max_taps": int(ctx.setup.options["gather_taps"]),
+                    "u_max_taps": int(ctx.setup.options["gather_taps"]) if receiver.inner_ndc is None else CORE_TAPS,
                 }
             )
             ctx.device.draw_fullscreen(program, target, blend="add")

@@ -31,8 +31,8 @@ class ReceiverView:
 
     `view.light` may be a virtual light: under water the light comes along the refracted direction (directional), or
     from the surface's image of the lamp (point, spot). Seen from the real light the deck would hide what it does reach.
-    `inner_ndc`: of a core, the half extents of the part that counts, in clip space; light beyond it is looked up in the map around.
-    `clip_plane`: (a, b, c, d); receivers where a x + b y + c z + d < 0 (above the water) are not drawn.
+    `inner_ndc`: of a core, the half extents of the part that counts, in clip space; light beyond it is looked up in the
+    map around. `clip_plane`: (a, b, c, d); receivers where a x + b y + c z + d < 0 (above the water) are not drawn.
     """
 
     name: str
