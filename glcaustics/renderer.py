@@ -225,8 +225,8 @@ class Renderer:
         seed: of everything random.
         options: single options on top of the ladder, see `glcaustics methods`.
         stats: read solves back and count them.
-        keep: draw what the camera does not enter (shadow maps, caustic maps) anew only when the scene has moved; off, every
-            frame pays for all of it, as the benchmarks want.
+        keep: draw what the camera does not enter (shadow maps, caustic maps) anew only when the scene has moved;
+            off, every frame pays for all of it, as the benchmarks want.
         shader_root: another folder of shaders than the project's own, for tests.
 
     Raises:

@@ -14,9 +14,9 @@ import numpy.typing as npt
 from glcaustics import metrics
 from glcaustics.bench.mitsuba_truth import Halves
 from glcaustics.bench.targets import Target, luminance
+from glcaustics.caustics.registry import METHODS
 from glcaustics.errors import UsageError
 from glcaustics.optics.pixels import box_filter
-from glcaustics.caustics.registry import METHODS
 from glcaustics.renderer import Renderer
 from glcaustics.scene.load import load_scene
 from glcaustics.scene.model import Scene
@@ -68,7 +68,7 @@ def summary(values: list[float], kind: str) -> dict[str, Any]:
 
 
 def same_paths(case: Case) -> dict[str, Any]:
-    """Options with which a method follows the same paths as the truth: two interfaces of a solid, no reflection inside."""
+    """Options by which a method follows the truth's paths: two interfaces of a solid, no reflection inside."""
     method = METHODS.get(case.method)
     if method is not None and case.target.interfaces == 2 and "internal_bounces" in method.ladder[case.quality]:
         return {"internal_bounces": 0}

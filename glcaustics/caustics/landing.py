@@ -84,7 +84,7 @@ def _core(
     receivers: FloatArray,
     boxes: FloatArray,
 ) -> ReceiverView | None:
-    """A view of the part of a window in which most of the light lands, where that part is small: the focus of a lens."""
+    """A view of the small part of a window in which most of the light lands, if there is one: a lens's focus."""
     if len(points) == 0 or around.view.faces == 6:
         return None
     u, v = _window_coordinates(around.view, points)

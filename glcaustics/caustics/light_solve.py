@@ -93,7 +93,7 @@ class LightMapMethod(CausticsMethod):
     def declare_map(
         self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, receiver: ReceiverView, branches: list[Branch]
     ) -> None:
-        """Add the passes that write `map_resource(light, receiver)` from these branches, which all land in that view."""
+        """Add the passes that write `map_resource(light, receiver)` from these branches, which land in that view."""
 
     def map_resource(self, light: LightSetup, receiver: ReceiverView) -> str:
         """The caustic map of one light and receiver view: flux per texel."""

@@ -144,7 +144,14 @@ class Device(Resources):
         """
         array = self._no_buffers(program)
         self.draw(
-            array, program, fbo, vertices=3, blend=blend, viewport=viewport, depth_func=depth_func, depth_write=depth_write
+            array,
+            program,
+            fbo,
+            vertices=3,
+            blend=blend,
+            viewport=viewport,
+            depth_func=depth_func,
+            depth_write=depth_write,
         )
 
     def draw_points(

@@ -35,7 +35,7 @@ class PlanRunner:
         return self.device.texture(desc.size, desc.format, filter=desc.filter, compare=desc.compare, label=label)
 
     def run(self, frame: FrameState) -> None:
-        """Execute every step; those that the camera does not enter only when the scene has moved since they last ran."""
+        """Execute every step; those that the camera does not enter only when the scene has moved since."""
         same = self._still_version == frame.gpu.version
         self.skipped = self._still if same else frozenset()
         self._still_version = frame.gpu.version

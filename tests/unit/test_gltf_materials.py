@@ -204,9 +204,7 @@ def test_what_is_not_supported_is_announced(tmp_path: Path) -> None:
         "alphaMode": "BLEND",
         "extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.8, "transmissionTexture": {"index": 0}}},
     }
-    build = builder(
-        [plane() | {"material": 0}], materials=[material], images=[png(np.full((2, 2, 3), 51, np.uint8))]
-    )
+    build = builder([plane() | {"material": 0}], materials=[material], images=[png(np.full((2, 2, 3), 51, np.uint8))])
     build.root["extensionsUsed"] = ["KHR_materials_clearcoat"]
     scene = load_gltf(build.write(tmp_path / "a.glb"))
     text = "\n".join(scene.announcements)
