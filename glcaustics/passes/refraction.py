@@ -91,7 +91,7 @@ def _finish(ctx: PassContext, outputs: dict[str, int]) -> None:
         program = device.program("passes/refraction/todo").set(t_radiance=ctx.texture("view.radiance"))
         device.draw_fullscreen(program, ctx.target(depth=TODO), depth_func="1", depth_write=True)
     with device.timer("refraction/marching"):
-        program = _program(ctx, outputs, NEWTON=1, MARCH=_MARCH["cascade"], SOUSA=0, FINAL=1, RETRY=1)
+        program = _program(ctx, outputs, NEWTON=0, MARCH=_MARCH["cascade"], SOUSA=0, FINAL=1, RETRY=1)
         target = ctx.target(*OUTPUTS.values(), depth=TODO)
         device.draw_fullscreen(program.set(u_mask_depth=0.75), target, depth_func="<=")
     with device.timer("refraction/reflection"):

@@ -38,7 +38,7 @@ GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, 
     bool front = true;
     vec3 p = ray.start;
     int i = 0;
-    for (int candidate = 0; candidate < 8 && i <= count; ++candidate) {
+    for (int candidate = 0; candidate < 256 && i <= count; ++candidate) {
         bool was_front = front;
         for (; i <= count; ++i) {
             was_front = front;
@@ -59,58 +59,81 @@ GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, 
     return solve;
 }
 
-// Over bounds of s: t_bounds_4, t_bounds_16: rg32f, largest and smallest s of 4 x 4 and 16 x 16 texels.
+// The same samples over bounds of s, t_bounds_4 and t_bounds_16 (rg32f, largest and smallest s of 4 x 4 and 16 x 16 texels): whole
+// cells that the ray is in front of, or stays behind, are skipped, so it finds what the pixel-exact march finds. Where that finds
+// nothing, it takes the first texel whose plane the ray crosses although no centre's depth told (blades seen edge-on).
 GlcSolve glc_march_hierarchical(sampler2D t_bounds_4, sampler2D t_bounds_16, sampler2D t_plane, GlcRasterRay ray, int max_steps) {
-    GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_NOTHING, 0);
+    GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_DIVERGED, 0);
+    GlcSolve crossed = solve;
     vec2 last = vec2(textureSize(t_plane, 0)) - 1.0;
     vec2 inverse = 1.0 / mix(ray.step.xy, vec2(1e-6), lessThan(abs(ray.step.xy), vec2(1e-6)));
     vec2 ahead = vec2(greaterThan(inverse, vec2(0.0)));
-    float extent = max(max(abs(ray.step.x), abs(ray.step.y)), 1e-6);
-    float nudge = 0.02 / extent, slack = 0.5 / extent;
-    float cell = 4.0, u = 0.0;
-    bool behind = false;
-    solve.status = GLC_SOLVE_DIVERGED;
+    float pixels = max(max(abs(ray.step.x), abs(ray.step.y)) * ray.u_screen, 1.0);
+    float du = ray.u_screen / pixels, count = ceil(pixels), at = 0.0, cell = 4.0;
+    bool front = true;
     for (int i = 0; i < max_steps; ++i) {
-        vec2 px = clamp(ray.start.xy + u * ray.step.xy, vec2(0.0), last + 0.999);
+        float u = min(at * du, ray.u_screen);
+        vec3 p = ray.start + u * ray.step;
+        vec2 px = clamp(p.xy, vec2(0.0), last + 0.999);
         vec2 index = floor(px / cell);
-        vec2 leaves = ((index + ahead) * cell - ray.start.xy) * inverse;
-        float u_exit = min(max(min(leaves.x, leaves.y), u) + nudge, 1.0);
-        vec2 s = vec2(ray.start.z + u * ray.step.z, ray.start.z + u_exit * ray.step.z);
-        bool over = false, under = false;   // in front of all of the cell; behind all of it
-        solve.iterations = i + 1;
+        float next = at + 1.0;
+        bool over, under;   // in front of all of the cell; behind all of it as before
         if (cell > 1.0) {
+            vec2 leaves = ((index + ahead) * cell - ray.start.xy) * inverse;
+            float u_exit = clamp(min(leaves.x, leaves.y), u, ray.u_screen);
+            float s_exit = ray.start.z + u_exit * ray.step.z;
             vec2 bounds = cell > 4.0 ? texelFetch(t_bounds_16, ivec2(index), 0).rg : texelFetch(t_bounds_4, ivec2(index), 0).rg;
-            over = min(s.x, s.y) > bounds.x;
-            under = max(s.x, s.y) < bounds.y;
+            over = min(p.z, s_exit) > bounds.x;
+            under = !front && max(p.z, s_exit) < bounds.y;
+            next = max(next, ceil(u_exit / du));
         } else {
-            vec2 f = glc_raster_plane(ray, texelFetch(t_plane, ivec2(index), 0));
+            vec4 plane = texelFetch(t_plane, ivec2(index), 0);
+            over = plane.w <= 0.0 || p.z > plane.z + dot(plane.xy, index + 0.5);
+            under = !over;
+            if (under && front) {
+                solve.u = u;
+                solve.iterations = i + 1;
+                if (glc_march_settle(t_plane, ray, 2.5 * du, solve)) return solve;
+            }
+            vec2 f = glc_raster_plane(ray, plane);
             float met = f.x / (f.y < 0.0 ? f.y : -1e-30);
-            if (f.y < 0.0 && met >= max(u - slack, 0.0) && met <= min(u_exit + slack, 1.0)) {
-                vec2 off = abs(ray.start.xy + met * ray.step.xy - index - 0.5);
-                solve.u = met;
-                solve.texel = index;
-                solve.error_px = max(off.x, off.y);
-                solve.status = GLC_SOLVE_HIT;
+            vec2 off = abs(ray.start.xy + met * ray.step.xy - index - 0.5);
+            if (crossed.status != GLC_SOLVE_HIT && f.y < 0.0 && met >= 0.0 && met <= 1.0 && max(off.x, off.y) <= GLC_SOLVE_TOLERANCE_PX)
+                crossed = GlcSolve(met, met, index, max(off.x, off.y), GLC_SOLVE_HIT, i + 1);
+        }
+        solve.iterations = i + 1;
+        if (over || under) {
+            front = over;
+            at = next;
+            if (at > count) {
+                solve.status = ray.u_screen < 1.0 ? GLC_SOLVE_OFFSCREEN : (front ? GLC_SOLVE_NOTHING : GLC_SOLVE_HIDDEN);
                 break;
             }
-            over = u_exit * f.y - f.x > 0.0;
-            under = !over;
-        }
-        if (over || under) {
-            if (over) solve.u_front = max(u_exit - 2.0 * nudge, u);   // still inside the cell
-            behind = under;
-            u = u_exit;
+            if (over) solve.u_front = min((at - 1.0) * du, ray.u_screen);
             // Up again only where a new coarser cell begins, so that the march does not flutter between levels.
-            vec2 next = floor((ray.start.xy + u * ray.step.xy) / (4.0 * cell));
-            if (cell < 16.0 && next != floor(px / (4.0 * cell))) cell *= 4.0;
+            vec2 coarser = floor((ray.start.xy + at * du * ray.step.xy) / (4.0 * cell));
+            if (cell < 16.0 && coarser != floor(px / (4.0 * cell))) cell *= 4.0;
         } else {
             cell *= 0.25;
         }
-        if (u >= ray.u_screen) {
-            solve.status = ray.u_screen < 1.0 ? GLC_SOLVE_OFFSCREEN : (behind ? GLC_SOLVE_HIDDEN : GLC_SOLVE_NOTHING);
-            break;
-        }
     }
-    if (solve.status != GLC_SOLVE_HIT) solve.u = u;
+    solve.u = ray.u_screen;
+    crossed.iterations = solve.iterations;
+    if (crossed.status == GLC_SOLVE_HIT) return crossed;
     return solve;
+}
+
+// Whether the way to a hit of Newton's method is clear: ray points on it against the nearest s of 4 x 4 texels around them. False:
+// something may stand before one of them, the ray may have met it first. Points one to `count`, a cell apart where the ray is short.
+bool glc_way_is_clear(sampler2D t_bounds_4, GlcRasterRay ray, GlcSolve solve, int count) {
+    vec2 last = vec2(textureSize(t_bounds_4, 0)) - 1.0;
+    vec2 way = abs(solve.u * ray.step.xy);
+    int points = min(int(max(way.x, way.y) / 4.0), count);
+    float stride = solve.u / float(points + 1);
+    float clear = 1.0;
+    for (int i = 1; i <= points; ++i) {
+        vec3 p = ray.start + float(i) * stride * ray.step;
+        clear = min(clear, p.z - texelFetch(t_bounds_4, ivec2(clamp(p.xy / 4.0, vec2(0.0), last)), 0).r);
+    }
+    return clear > 0.0;
 }

@@ -11,8 +11,10 @@ uniform sampler2D t_opaque_depth_m;
 #if USE_NEWTON || USE_MARCH
 uniform sampler2D t_plane;
 #endif
-#if USE_MARCH == 2
+#if USE_MARCH == 2 || !FINAL
 uniform sampler2D t_bounds_4;
+#endif
+#if USE_MARCH == 2
 uniform sampler2D t_bounds_16;
 #endif
 #if HAS_CAUSTICS_VIEW
@@ -24,6 +26,9 @@ uniform float u_bounds_diagonal_m;
 uniform int u_refraction_iterations;
 uniform int u_refraction_steps;
 uniform int u_reflection_steps;
+
+// Points of a ray at which the cascade looks for what may stand before it.
+const int CLEAR_POINTS = 6;
 
 Seen seen_at(vec2 uv, float distance_m, GlcSolve solve, float status) {
     Seen seen = Seen(textureLod(t_radiance, uv, 0.0).rgb, vec3(0.0), distance_m, uv, solve.error_px, float(solve.iterations), status);
@@ -141,7 +146,9 @@ Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved) {
     if (solved) {
         bool mixes;
         seen = seen_hit(ray, solve, status, mixes);
-        if (mixes && FINAL == 0) solved = false;
+#if !FINAL
+        solved = !mixes && glc_way_is_clear(t_bounds_4, ray, solve, CLEAR_POINTS);
+#endif
         return seen;
     }
 #if FINAL
