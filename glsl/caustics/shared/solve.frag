@@ -8,8 +8,7 @@
 #define GLC_THROUGH 1
 #define GLC_IN_AND_OUT 2
 
-#include "common/intersect.glsl"
-#include "common/intersect_box.glsl"
+#include "common/solid_path.glsl"
 #include "interface/caster_view.glsl"
 #include "interface/receiver_view.glsl"
 #include "interface/light.glsl"
@@ -42,8 +41,6 @@ uniform float u_caster_area_m2;    // total flux is kept comparable: E_perp x th
 layout(location = 0) out vec4 o_landing;  // xyz: landing point, metres, world; w: status (see intersect.glsl; GLC_TIR; 0 = no caster)
 layout(location = 1) out vec4 o_flux;     // rgb: flux (carried, or lost when status < 0), W or lm; w: look-ups
 
-#define GLC_TIR -1
-#define GLC_NO_EXIT -4
 #define GLC_DARK -5
 #define GLC_AVERTED -6
 #define GLC_SECOND_HIT -7
@@ -56,82 +53,6 @@ vec3 texel_flux(GlcView view, vec3 p_ws, vec3 d, float n_dot_l) {
     return u_light_intensity * glc_light_cone(d) * glc_texel_solid_angle(view, p_ws);
 #endif
 }
-
-#if BRANCH == GLC_IN_AND_OUT
-// Where a ray inside the solid leaves it: the stretch behind its front and before its back faces ends. Needed where the back faces
-// alone give no answer, and after a total reflection, when the way out may be through the front.
-GlcHit leave_inside(GlcView view, vec3 o, vec3 d, float t_max) {
-    GlcHit hit = GlcHit(0.0, o, -d, 0, GLC_LEFT);
-    t_max += 4.0 * glc_texel_width(view, o);   // where the solid fills its box, a texel still counts as inside at the box's face
-    float t_in = 0.0;
-    bool entered = false;
-    for (int i = 1; i <= u_march_steps; ++i) {
-        float t = t_max * float(i) / float(u_march_steps);
-        GlcProbe front = glc_probe(t_caster_position, view, o + t * d, -t_max);
-        GlcProbe back = glc_probe(t_back_position, view, o + t * d, -t_max);
-        hit.iterations += 2;
-        bool inside = front.valid && back.valid && front.gap <= 0.0 && back.gap >= 0.0;
-        if (inside) { t_in = t; entered = true; continue; }
-        if (!entered && i < 2) continue;  // the first step may still graze the surface that the ray comes from
-        float lo = t_in, hi = t;
-        bool through_front = false;
-        GlcProbe last = back;
-        for (int k = 0; k < 10; ++k) {
-            float mid = 0.5 * (lo + hi);
-            front = glc_probe(t_caster_position, view, o + mid * d, -t_max);
-            back = glc_probe(t_back_position, view, o + mid * d, -t_max);
-            if (!front.valid || !back.valid) { hi = mid; continue; }
-            through_front = -front.gap < back.gap;
-            last = through_front ? front : back;
-            if (front.gap <= 0.0 && back.gap >= 0.0) lo = mid; else hi = mid;
-        }
-        hit.iterations += 20;
-        hit.t = hi;
-        bool settled = false;
-        if (last.valid) {
-            if (through_front) settled = glc_settle(t_caster_normal, view, last, o, d, 2.0 * GLC_REACH, hit);
-            else settled = glc_settle(t_back_normal, view, last, o, d, 2.0 * GLC_REACH, hit);
-        }
-        if (settled) hit.status = GLC_BRACKETED;
-        return hit;
-    }
-    return hit;
-}
-
-// From the first interface to beyond the last one: p and ray are moved there, flux is what is left. 0, or why the light is lost.
-int pass_solid(GlcView view, GlcObject object, float ior, inout vec3 p, inout vec3 ray, inout vec3 flux, inout float iterations) {
-    float t_max = glc_box_exit(p, ray, u_caster_min_ws, u_caster_max_ws);
-    GlcHit exit = glc_intersect(t_back_position, t_back_normal, view, p, ray, t_max, ESTIMATE, u_max_iterations, 0);
-    iterations += float(exit.iterations);
-    for (int bounce = 0; bounce <= u_internal_bounces; ++bounce) {
-        if (exit.status <= 0) {
-            exit = leave_inside(view, p, ray, t_max);
-            iterations += float(exit.iterations);
-            if (exit.status <= 0) return GLC_NO_EXIT;
-        }
-        flux *= glc_transmittance(object.sigma_a, exit.t);
-        // Sub-texel normal on the back: bilinear over the stored ones; empty texels are zero and drop out of the sum.
-        vec3 n = -exit.normal_ws;
-        if (bounce == 0) {
-            vec3 projected = glc_view_project(view, exit.position_ws);
-            n = -glc_safe_normalize(textureLod(t_back_normal, projected.xy / view.size, 0.0).xyz, exit.normal_ws);
-        }
-        if (dot(n, ray) > 0.0) n = -n;
-        vec3 outside;
-        float reflected_share = glc_fresnel_dielectric(-dot(n, ray), 1.0 / ior);
-        bool leaves = glc_refract(ray, n, 1.0 / ior, outside);  // else the mirror direction
-        p = exit.position_ws;
-        ray = outside;
-        if (leaves) {
-            flux *= 1.0 - reflected_share;
-            return 0;
-        }
-        t_max = glc_box_exit(p, ray, u_caster_min_ws, u_caster_max_ws);
-        exit.status = 0;
-    }
-    return GLC_TIR;
-}
-#endif
 
 void main() {
     o_landing = vec4(0.0);
@@ -175,7 +96,9 @@ void main() {
     flux *= transmitted_share;
     bool in_absorber = object.kind == GLC_INTERFACE && !from_dense;
 #if BRANCH == GLC_IN_AND_OUT
-    int lost = pass_solid(caster_view, object, ior, p, ray, flux, iterations);
+    int lost = glc_pass_solid(t_caster_position, t_caster_normal, t_back_position, t_back_normal, caster_view, u_caster_min_ws,
+                              u_caster_max_ws, object.sigma_a, ior, ESTIMATE, u_max_iterations, u_march_steps, u_internal_bounces,
+                              p, ray, flux, iterations);
     if (lost != 0) { o_landing.w = float(lost); o_flux = vec4(flux, iterations); return; }
 #endif
 #endif

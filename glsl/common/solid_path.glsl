@@ -1,0 +1,86 @@
+#include "common/intersect.glsl"
+#include "common/intersect_box.glsl"
+
+// A ray's way through a solid that is known as front and back faces in a light's view (Wyman 2005; here refined by intersection,
+// and followed through total reflections). Pure functions: the maps and the box around the solids are arguments.
+
+#define GLC_TIR -1
+#define GLC_NO_EXIT -4
+
+// Where a ray inside the solid leaves it: the stretch behind its front and before its back faces ends. Needed where the back faces
+// alone give no answer, and after a total reflection, when the way out may be through the front.
+GlcHit glc_leave_inside(sampler2D t_front, sampler2D t_front_normal, sampler2D t_back, sampler2D t_back_normal,
+                        GlcView view, vec3 o, vec3 d, float t_max, int march_steps) {
+    GlcHit hit = GlcHit(0.0, o, -d, 0, GLC_LEFT);
+    t_max += 4.0 * glc_texel_width(view, o);   // where the solid fills its box, a texel still counts as inside at the box's face
+    float t_in = 0.0;
+    bool entered = false;
+    for (int i = 1; i <= march_steps; ++i) {
+        float t = t_max * float(i) / float(march_steps);
+        GlcProbe front = glc_probe(t_front, view, o + t * d, -t_max);
+        GlcProbe back = glc_probe(t_back, view, o + t * d, -t_max);
+        hit.iterations += 2;
+        bool inside = front.valid && back.valid && front.gap <= 0.0 && back.gap >= 0.0;
+        if (inside) { t_in = t; entered = true; continue; }
+        if (!entered && i < 2) continue;  // the first step may still graze the surface that the ray comes from
+        float lo = t_in, hi = t;
+        bool through_front = false;
+        GlcProbe last = back;
+        for (int k = 0; k < 10; ++k) {
+            float mid = 0.5 * (lo + hi);
+            front = glc_probe(t_front, view, o + mid * d, -t_max);
+            back = glc_probe(t_back, view, o + mid * d, -t_max);
+            if (!front.valid || !back.valid) { hi = mid; continue; }
+            through_front = -front.gap < back.gap;
+            last = through_front ? front : back;
+            if (front.gap <= 0.0 && back.gap >= 0.0) lo = mid; else hi = mid;
+        }
+        hit.iterations += 20;
+        hit.t = hi;
+        bool settled = false;
+        if (last.valid) {
+            if (through_front) settled = glc_settle(t_front_normal, view, last, o, d, 2.0 * GLC_REACH, hit);
+            else settled = glc_settle(t_back_normal, view, last, o, d, 2.0 * GLC_REACH, hit);
+        }
+        if (settled) hit.status = GLC_BRACKETED;
+        return hit;
+    }
+    return hit;
+}
+
+// From the first interface to beyond the last one: p and ray are moved there, flux is what is left, iterations the look-ups.
+// bounces: total reflections that are followed. Returns 0, or why the light is lost.
+int glc_pass_solid(sampler2D t_front, sampler2D t_front_normal, sampler2D t_back, sampler2D t_back_normal, GlcView view,
+                   vec3 box_min, vec3 box_max, vec3 sigma_a, float ior, int estimate, int max_iterations, int march_steps,
+                   int bounces, inout vec3 p, inout vec3 ray, inout vec3 flux, inout float iterations) {
+    float t_max = glc_box_exit(p, ray, box_min, box_max);
+    GlcHit exit = glc_intersect(t_back, t_back_normal, view, p, ray, t_max, estimate, max_iterations, 0);
+    iterations += float(exit.iterations);
+    for (int bounce = 0; bounce <= bounces; ++bounce) {
+        if (exit.status <= 0) {
+            exit = glc_leave_inside(t_front, t_front_normal, t_back, t_back_normal, view, p, ray, t_max, march_steps);
+            iterations += float(exit.iterations);
+            if (exit.status <= 0) return GLC_NO_EXIT;
+        }
+        flux *= glc_transmittance(sigma_a, exit.t);
+        // Sub-texel normal on the back: bilinear over the stored ones; empty texels are zero and drop out of the sum.
+        vec3 n = -exit.normal_ws;
+        if (bounce == 0) {
+            vec3 projected = glc_view_project(view, exit.position_ws);
+            n = -glc_safe_normalize(textureLod(t_back_normal, projected.xy / view.size, 0.0).xyz, exit.normal_ws);
+        }
+        if (dot(n, ray) > 0.0) n = -n;
+        vec3 outside;
+        float reflected_share = glc_fresnel_dielectric(-dot(n, ray), 1.0 / ior);
+        bool leaves = glc_refract(ray, n, 1.0 / ior, outside);  // else the mirror direction
+        p = exit.position_ws;
+        ray = outside;
+        if (leaves) {
+            flux *= 1.0 - reflected_share;
+            return 0;
+        }
+        t_max = glc_box_exit(p, ray, box_min, box_max);
+        exit.status = 0;
+    }
+    return GLC_TIR;
+}
