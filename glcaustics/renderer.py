@@ -148,6 +148,7 @@ def _declare(
         for with_specular in (False, True):
             rsm.declare(graph, setup, light, with_specular=with_specular)
     gbuffer.declare_opaque(graph, setup)
+    depth_chain.declare(graph, setup)
     lighting.declare_lighting(graph, setup)
     caustics = _declare_caustics(graph, setup, method, method_name)
     lighting.declare_shade(graph, setup)
@@ -158,7 +159,6 @@ def _declare(
             gbuffer.declare_back(graph, setup)
         else:
             graph.leave_out("gbuffer.specular_back", "nothing in the scene is a solid with two interfaces")
-        depth_chain.declare(graph, setup)
         refraction.declare(graph, setup)
     else:
         for name in ("gbuffer.specular", "gbuffer.specular_back", "refraction"):
@@ -282,6 +282,7 @@ class Renderer:
         self.announcements = [*scene.announcements, *self.device.announcements]
         self._gpu = GpuScene(self.device)
         self._time: float | None = None
+        self._frames = 0
         self._runner: PlanRunner | None = None
         self._declared: _Declared | None = None
         self._previous: tuple[CameraState, dict[str, Any]] | None = None
@@ -364,6 +365,7 @@ class Renderer:
         runner = self._prepared(time)
         frame = self._frame_state(time, jitter_px)
         runner.run(frame)
+        self._frames += 1
         if jitter_px == (0.0, 0.0):  # a shifted sample is no frame of its own: motion is counted from frame to frame
             self._previous = (frame.camera, {i.instance.name: i.world_from_object for i in self._gpu.items})
         if self._target is not None:
@@ -412,7 +414,7 @@ class Renderer:
         view = self.scene.view_at(time)
         camera = CameraState.make(view, self.size, self._setup.scene_bounds_ws, jitter_px, boxes)
         before, transforms = self._previous or (camera, {})
-        return FrameState(time, camera, before, self._gpu, self._exposure(), transforms)
+        return FrameState(time, camera, before, self._gpu, self._exposure(), transforms, self._frames)
 
     def _exposure(self) -> float:
         """The scene's exposure, or one that shows a white surface in full light a stop above middle grey's."""

@@ -16,6 +16,7 @@ from glcaustics.scene.model import OpticalKind, Scene
 QUALITIES = ("draft", "low", "medium", "high", "reference")
 
 IRRADIANCE = "caustics.irradiance"  # what every method writes: E_c at the camera's opaque pixels, W/m^2 or lux
+NOISY_IRRADIANCE = "caustics.irradiance_noisy"  # what a noisy method writes instead when it is denoised
 
 
 class CausticsMethod(ABC):
@@ -28,6 +29,8 @@ class CausticsMethod(ABC):
         name: as in `--method`. summary: one line. paper: author, year, title.
         ladder: quality -> options; more cost and less error from step to step.
         option_help: option -> one line with its unit and range.
+        noisy: it has the option "denoise"; with it, it writes `NOISY_IRRADIANCE`, which the denoiser turns into the irradiance.
+        unbiased_options: under which its mean is the truth: what closed forms are tested with.
     """
 
     name: ClassVar[str]
@@ -35,6 +38,8 @@ class CausticsMethod(ABC):
     paper: ClassVar[str]
     ladder: ClassVar[Mapping[str, Mapping[str, Any]]]
     option_help: ClassVar[Mapping[str, str]] = {}
+    noisy: ClassVar[bool] = False
+    unbiased_options: ClassVar[Mapping[str, Any]] = {}
 
     @classmethod
     def why_not(cls, scene: Scene) -> str | None:

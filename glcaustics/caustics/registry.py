@@ -7,6 +7,7 @@ import difflib
 from glcaustics.caustics.caustic_map import CausticMap
 from glcaustics.caustics.displaced_mesh import DisplacedMesh
 from glcaustics.caustics.method import CausticsMethod
+from glcaustics.caustics.photon_trace import PhotonTrace
 from glcaustics.errors import UsageError
 from glcaustics.passes.geometry import TRANSMISSIVE_KINDS
 from glcaustics.scene.model import Scene
@@ -14,6 +15,7 @@ from glcaustics.scene.model import Scene
 METHODS: dict[str, type[CausticsMethod]] = {
     "caustic_map": CausticMap,
     "displaced_mesh": DisplacedMesh,
+    "photon_trace": PhotonTrace,
 }
 
 NONE = "none"  # caustics off: light passes through water and glass as if they were not there

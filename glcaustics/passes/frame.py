@@ -367,6 +367,7 @@ class FrameState:
     gpu: GpuScene
     exposure: float
     previous_transforms: Mapping[str, FloatArray] = field(default_factory=dict)
+    index: int = 0  # frames drawn before this one
 
     def uniforms(self) -> dict[str, Any]:
         return self.camera.uniforms()

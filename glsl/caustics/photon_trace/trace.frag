@@ -1,0 +1,132 @@
+// Cascaded image-space photon tracing (Meenrattanakorn & Lambers 2022): one fragment a photon. It starts at a point that the light
+// sees of a specular surface, is refracted or reflected, and followed through the light's view, then through the camera's.
+// BRANCH: GLC_REFLECT, GLC_THROUGH (an open interface) or GLC_IN_AND_OUT (a solid's two). CHANCE 1: Fresnel's equations decide which of
+// the branches a photon takes (theirs); 0: every photon takes all, weighted: less noise for more work.
+#define GLC_REFLECT 0
+#define GLC_THROUGH 1
+#define GLC_IN_AND_OUT 2
+
+#include "common/solid_path.glsl"
+#include "interface/receiver_view.glsl"
+#include "interface/light.glsl"
+#include "interface/objects.glsl"
+#include "caustics/photon_trace/sample.glsl"
+#include "caustics/photon_trace/land.glsl"
+
+uniform sampler2D t_receiver_position;
+uniform sampler2D t_receiver_normal;
+uniform vec3 u_bounds_min_ws;      // box around all receivers
+uniform vec3 u_bounds_max_ws;
+#if BRANCH == GLC_IN_AND_OUT
+uniform sampler2D t_back_position;
+uniform sampler2D t_back_normal;
+uniform vec3 u_caster_min_ws;      // box around the solids
+uniform vec3 u_caster_max_ws;
+uniform int u_internal_bounces;
+#endif
+uniform vec3 u_channels;           // 1 for the colour channels that this branch carries, else 0
+uniform int u_channel;             // channel whose index of refraction is used
+uniform int u_max_iterations;
+uniform int u_march_steps;
+
+layout(location = 0) out vec4 o_landing;  // xy: pixel; z: 1 / area of the receiver in it, 1/m^2; w: status (land.glsl; 0 = no photon)
+layout(location = 1) out vec4 o_flux;     // rgb: flux (carried, or lost when status < 0), W or lm; w: look-ups
+
+#define PHOTON_DARK -5
+#define PHOTON_AVERTED -6
+#define PHOTON_SECOND_HIT -7
+const int ESTIMATE = GLC_HYBRID;
+
+vec3 stratum_flux(GlcView view, vec3 p_ws, vec3 d) {
+    float texels = view.size.x * view.size.y / float(u_photon_grid.x * u_photon_grid.y);
+    if (u_light.w == 0.0) return u_light_intensity * (view.texel_measure * texels);
+    return u_light_intensity * (glc_light_cone(d) * glc_texel_solid_angle(view, p_ws) * texels);
+}
+
+// Reflected and transmitted share of the flux; ior: of the channel that decides the direction.
+void split(GlcObject object, float n_dot_l, float eta, out vec3 reflected, out float transmitted) {
+    bool mirror = object.kind == GLC_MIRROR;
+    float r = glc_fresnel_dielectric(n_dot_l, eta);
+    reflected = mirror ? glc_fresnel_metal(object.base_color, n_dot_l) : vec3(r);
+    transmitted = mirror ? 0.0 : (1.0 - r) * object.transmission;
+}
+
+void main() {
+    o_landing = vec4(0.0);
+    o_flux = vec4(0.0);
+    uvec2 cell = uvec2(gl_FragCoord.xy);
+    vec3 xi = glc_stratum_point(cell, u_seed, u_sequence);
+    GlcView caster_view = glc_caster_view();
+    vec2 at = min((vec2(cell) + xi.xy) / vec2(u_photon_grid) * caster_view.size, caster_view.size - 0.001);
+    PhotonStart start = photon_start(at);
+    if (start.object < 0) return;
+    GlcObject object = glc_object(start.object);
+#if BRANCH == GLC_THROUGH
+    if (object.kind != GLC_INTERFACE) return;
+#elif BRANCH == GLC_IN_AND_OUT
+    if (object.kind != GLC_SOLID) return;
+#endif
+    vec3 p = start.position_ws;
+    vec3 d = glc_light_direction(caster_view, p);
+    bool from_dense = object.kind == GLC_INTERFACE && start.side < 0.0;
+    vec3 n = start.normal_ws * (start.side < 0.0 ? -1.0 : 1.0);
+    float n_dot_l = -dot(n, d);
+    vec3 flux = stratum_flux(caster_view, p, d) * u_channels;
+    if (n_dot_l <= 0.0) { o_landing.w = float(PHOTON_AVERTED); o_flux.rgb = flux; return; }
+    float ior = object.ior[u_channel];
+    float eta = from_dense ? 1.0 / ior : ior;
+    if (from_dense && u_light.w != 0.0) flux *= glc_transmittance(object.sigma_a, length(p - u_light.xyz));
+
+    vec3 reflected;
+    float transmitted;
+    split(object, n_dot_l, eta, reflected, transmitted);
+#if CHANCE
+    float chance = object.kind == GLC_MIRROR ? 1.0 : reflected.g;
+    bool is_reflected = xi.z < chance;
+    if (is_reflected != (BRANCH == GLC_REFLECT)) return;
+    flux /= is_reflected ? chance : 1.0 - chance;
+#endif
+    vec3 ray = reflect(d, n);
+    float iterations = 0.0;
+#if BRANCH == GLC_REFLECT
+    flux *= reflected;
+    bool in_absorber = from_dense;
+#else
+    if (!glc_refract(d, n, eta, ray)) { o_landing.w = float(GLC_TIR); o_flux.rgb = flux; return; }
+    flux *= transmitted;
+    bool in_absorber = object.kind == GLC_INTERFACE && !from_dense;
+#if BRANCH == GLC_IN_AND_OUT
+    int lost = glc_pass_solid(t_caster_position, t_caster_normal, t_back_position, t_back_normal, caster_view, u_caster_min_ws,
+                              u_caster_max_ws, object.sigma_a, ior, ESTIMATE, u_max_iterations, u_march_steps, u_internal_bounces,
+                              p, ray, flux, iterations);
+    if (lost != 0) { o_landing.w = float(lost); o_flux = vec4(flux, iterations); return; }
+#endif
+#endif
+    if (max(flux.r, max(flux.g, flux.b)) <= 0.0) { o_landing.w = float(PHOTON_DARK); return; }
+
+    float t_max = glc_box_exit(p, ray, u_bounds_min_ws, u_bounds_max_ws);
+    if (t_max <= 0.0) { o_landing.w = float(PHOTON_LEFT); o_flux = vec4(flux, iterations); return; }
+    GlcView receiver_view = glc_receiver_view();
+#if BRANCH == GLC_REFLECT
+    // A reflected ray leaves the light's direction altogether: the fixed point has no reason to contract there.
+    GlcHit hit = glc_intersect_march(t_receiver_position, t_receiver_normal, receiver_view, p, ray, t_max, u_march_steps);
+#else
+    GlcHit hit = glc_intersect(t_receiver_position, t_receiver_normal, receiver_view, p, ray, t_max, ESTIMATE, u_max_iterations,
+                               u_march_steps);
+#endif
+    float slack_m = 0.5 * glc_texel_width(receiver_view, hit.status > 0 ? hit.position_ws : p);
+    PhotonLanding landing = photon_land(p, ray, hit, slack_m, t_max);
+    iterations += float(hit.iterations + landing.lookups);
+#if HAS_MIRROR
+    // Light that meets a second mirror on its way is another path (L S S D), which the photons do not follow.
+    if (landing.status > 0 && object.kind == GLC_MIRROR) {
+        vec3 lifted = p + n * (2.0 * glc_texel_width(caster_view, p));
+        GlcHit second = glc_intersect_march(t_caster_position, t_caster_normal, caster_view, lifted, ray, landing.t, u_march_steps);
+        iterations += float(second.iterations);
+        if (second.status > 0) landing.status = PHOTON_SECOND_HIT;
+    }
+#endif
+    if (in_absorber && landing.status > 0) flux *= glc_transmittance(object.sigma_a, landing.t);
+    o_landing = vec4(landing.px, landing.per_m2, float(landing.status));
+    o_flux = vec4(flux, iterations);
+}
