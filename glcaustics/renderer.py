@@ -12,8 +12,9 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from glcaustics.caustics.method import IRRADIANCE, QUALITIES, CausticsMethod
+from glcaustics.caustics.method import IRRADIANCE, NOISY_IRRADIANCE, QUALITIES, CausticsMethod
 from glcaustics.caustics.registry import AUTO, NONE, pick
+from glcaustics.denoise import svgf
 from glcaustics.errors import UsageError
 from glcaustics.gpu import Device, create_device
 from glcaustics.graph import FrameGraph, Plan
@@ -176,6 +177,8 @@ def _declare_caustics(graph: FrameGraph, setup: FrameSetup, method: CausticsMeth
     because = method.why_not(setup.scene)
     if because is None:
         method.declare(graph, setup)
+        if method.noisy and setup.options["denoise"]:
+            svgf.declare(graph, setup, NOISY_IRRADIANCE, IRRADIANCE, method.irradiance_desc(setup))
         return True
     method.leave_out(graph, setup, because)
     return False

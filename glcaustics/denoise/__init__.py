@@ -1,0 +1,1 @@
+"""Filters between a noisy estimate and the frame."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from glcaustics.errors import GraphError
 from glcaustics.gpu import Device
-from glcaustics.graph import Step, check_read, check_write
+from glcaustics.graph import Step, check_history, check_read, check_write
 from glcaustics.passes.geometry import SPECULAR_KINDS, GpuScene, boxes_of, points_of
 from glcaustics.passes.light_views import LightView, fit_view, orthographic, perspective, unit
 from glcaustics.scene.model import Camera, FloatArray, Instance, IntArray, Light, LightKind, OpticalKind, Scene
@@ -384,6 +384,7 @@ class PassContext:
         frame: FrameState,
         textures: Mapping[str, moderngl.Texture],
         framebuffers: dict[tuple[int, ...], moderngl.Framebuffer],
+        history: Mapping[str, moderngl.Texture] | None = None,
     ) -> None:
         self.step = step
         self.device = device
@@ -391,6 +392,12 @@ class PassContext:
         self.frame = frame
         self._textures = textures
         self._framebuffers = framebuffers
+        self._history = history or {}
+
+    def history(self, resource: str) -> moderngl.Texture:
+        """A declared history: the resource as the last frame left it, zero before the first. Raises GraphError otherwise."""
+        check_history(self.step, resource)
+        return self._history[resource]
 
     def texture(self, resource: str) -> moderngl.Texture:
         """A declared read, or what an earlier draw of the same pass wrote. Raises GraphError otherwise."""
