@@ -101,11 +101,19 @@ void photon_march(vec3 o, vec3 d, float t0, float t1, inout PhotonLanding landin
     GlcSolve solve = glc_march_hierarchical(t_bounds_4, t_bounds_16, t_plane, ray, u_view_steps);
     landing.lookups += solve.iterations;
     if (solve.status == GLC_SOLVE_HIT) {
-        vec4 stored = texelFetch(t_plane, ivec2(solve.texel), 0);
-        vec4 plane = photon_plane(stored);
-        landing.px = solve.texel;
-        landing.per_m2 = photon_per_m2(solve.texel, stored.w, plane.xyz);
         landing.t = part.x + glc_raster_distance(ray, solve.u);
+        // The march takes the first texel whose plane the ray crosses within half a pixel of it, which depends on the cells it skipped:
+        // the photon belongs to the pixel that it projects to, if that shows the same surface.
+        vec3 end = ray.start + solve.u * ray.step;
+        vec2 texel = clamp(floor(end.xy), vec2(0.0), u_raster_size - 1.0);
+        vec4 stored = texelFetch(t_plane, ivec2(texel), 0);
+        bool same = stored.w > 0.0 && abs(dot(photon_plane(stored), vec4(o + landing.t * d, 1.0))) < photon_pixel_width(stored.w);
+        if (!same) {
+            texel = solve.texel;
+            stored = texelFetch(t_plane, ivec2(texel), 0);
+        }
+        landing.px = texel;
+        landing.per_m2 = photon_per_m2(texel, stored.w, photon_plane(stored).xyz);
         landing.status = PHOTON_BY_EYE_VIEW;
     } else if (solve.status == GLC_SOLVE_HIDDEN) {
         landing.status = PHOTON_UNSEEN;

@@ -72,6 +72,7 @@ void main() {
     vec3 n = start.normal_ws * (start.side < 0.0 ? -1.0 : 1.0);
     float n_dot_l = -dot(n, d);
     vec3 flux = stratum_flux(caster_view, p, d) * u_channels;
+    if (max(flux.r, max(flux.g, flux.b)) <= 0.0) return;   // outside of a spot's cone
     if (n_dot_l <= 0.0) { o_landing.w = float(PHOTON_AVERTED); o_flux.rgb = flux; return; }
     float ior = object.ior[u_channel];
     float eta = from_dense ? 1.0 / ior : ior;
