@@ -23,6 +23,8 @@ struct PhotonLanding {
     float t;             // metres along the ray
     int status;
     int lookups;
+    vec4 plane;          // of that pixel, world space: unit normal towards the eye, and offset
+    float width_m;       // of that pixel
 };
 
 // The tangent plane in world space: unit normal towards the eye, and offset.
@@ -70,6 +72,8 @@ bool photon_is_seen(vec3 p, vec3 normal_ws, vec3 d, float slack_m, inout PhotonL
             if (dot(plane.xyz, d) >= 0.0) { landing.status = PHOTON_UNSEEN; return false; }   // arrives at the other side
             landing.px = at;
             landing.per_m2 = photon_per_m2(at, stored.w, plane.xyz);
+            landing.plane = plane;
+            landing.width_m = photon_pixel_width(stored.w);
             landing.status = PHOTON_BY_LIGHT_VIEW;
             return true;
         }
@@ -81,7 +85,7 @@ bool photon_is_seen(vec3 p, vec3 normal_ws, vec3 d, float slack_m, inout PhotonL
 // Part of the ray within the picture and in front of the eye.
 vec2 photon_clip(vec3 o, vec3 d, float t0, float t1) {
     vec4 q = u_raster_from_world * vec4(o, 1.0), dq = u_raster_from_world * vec4(d, 0.0);
-    float near_w = u_raster_orthographic ? 0.5 : 1e-3 * max(q.w, q.w + t1 * dq.w);
+    float near_w = u_camera_lens.z != 0.0 ? 0.5 : 1e-3 * max(q.w, q.w + t1 * dq.w);
     float value[5] = float[5](q.w - near_w, q.x, u_raster_size.x * q.w - q.x, q.y, u_raster_size.y * q.w - q.y);
     float slope[5] = float[5](dq.w, dq.x, u_raster_size.x * dq.w - dq.x, dq.y, u_raster_size.y * dq.w - dq.y);
     for (int i = 0; i < 5; ++i) {
@@ -124,9 +128,20 @@ void photon_march(vec3 o, vec3 d, float t0, float t1, inout PhotonLanding landin
 
 // hit: the light view's answer on o + t d; slack_m: how exactly it knows surfaces (half a texel); t_max: end of the receivers' box.
 PhotonLanding photon_land(vec3 o, vec3 d, GlcHit hit, float slack_m, float t_max) {
-    PhotonLanding landing = PhotonLanding(vec2(0.0), 0.0, hit.t, 0, 0);
+    PhotonLanding landing = PhotonLanding(vec2(0.0), 0.0, hit.t, 0, 0, vec4(0.0), 0.0);
     bool found = hit.status > 0;
-    if (found && photon_is_seen(hit.position_ws, hit.normal_ws, d, slack_m, landing)) return landing;
+    vec3 p = hit.position_ws, n = hit.normal_ws;
+    float slack = slack_m;
+    // Where the light's view is the coarser one, its end is carried on to the tangent planes that the eye sees: Newton's method.
+    for (int i = 0; found && i < 4; ++i) {
+        if (!photon_is_seen(p, n, d, slack, landing)) break;
+        n = landing.plane.xyz;
+        float gap = dot(n, p) + landing.plane.w, towards = -dot(n, d);
+        slack = abs(gap) / max(towards, 1e-3);
+        if (slack < 0.1 * landing.width_m || i == 3) return landing;
+        landing.t += gap / max(towards, 1e-3);
+        p = o + landing.t * d;
+    }
     if (found && landing.status != 0) return landing;
     photon_march(o, d, found ? max(hit.t - 4.0 * slack_m, 0.0) : 0.0, t_max, landing);
     if (landing.status > 0 || found) return landing;
