@@ -30,6 +30,7 @@ class CausticsMethod(ABC):
         ladder: quality -> options; more cost and less error from step to step.
         option_help: option -> one line with its unit and range.
         noisy: it has the option "denoise"; with it, it writes `NOISY_IRRADIANCE`, which the denoiser turns into the irradiance.
+        noise_share: standard deviation of its noise as a share of that of independent photons (Poisson), at most.
         unbiased_options: under which its mean is the truth: what closed forms are tested with.
     """
 
@@ -39,6 +40,7 @@ class CausticsMethod(ABC):
     ladder: ClassVar[Mapping[str, Mapping[str, Any]]]
     option_help: ClassVar[Mapping[str, str]] = {}
     noisy: ClassVar[bool] = False
+    noise_share: ClassVar[float] = 0.0
     unbiased_options: ClassVar[Mapping[str, Any]] = {}
 
     @classmethod

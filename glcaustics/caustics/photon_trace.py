@@ -46,9 +46,12 @@ class PhotonTrace(CausticsMethod):
     """See the module."""
 
     name = "photon_trace"
-    summary = "photons marched through the light's view, then the camera's: reflective caustics that the light does not see"
+    summary = (
+        "photons marched through the light's view, then the camera's: reflective caustics that the light does not see"
+    )
     paper = "Meenrattanakorn, Lambers 2022: Cascaded Image-Space Photon Tracing for Real-Time Caustics"
     noisy = True
+    noise_share = 0.4
     unbiased_options: ClassVar[Mapping[str, Any]] = {"denoise": False}
     ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         quality: {
@@ -152,9 +155,7 @@ class PhotonTrace(CausticsMethod):
             )
         )
 
-    def _declare_views(
-        self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, branches: list[Branch]
-    ) -> None:
+    def _declare_views(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, branches: list[Branch]) -> None:
         light_view.declare_caster(graph, setup, light)
         for receiver in light.receivers.values():
             if any(branch.view == receiver.name for branch in branches):

@@ -5,6 +5,10 @@ mean(E_ref), both means over the case's region and the three channels. The regio
 without the outermost ring of bins (for the sphere: all bins within one radius of the axis). Energy: the flux summed
 over the whole view (sphere: over that disc) against the entered flux times transmittance. `-s` shows the numbers.
 
+Noisy methods run with their `unbiased_options`. Each states, as `noise_share`, the standard deviation of its noise as a
+share of that of independent photons, whose variance in a bin is E x (flux of a photon) / (area of the bin). Tolerances
+widen by that noise: RMSE in quadrature, single bins by five standard deviations. Energy, encircled flux and folds do not.
+
 A method is left out of a case only where it declares by `why_not` that such a scene does not need it.
 """
 
@@ -33,6 +37,7 @@ SIZE = (512, 512)
 BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
 NAMES = sorted(name for name in METHODS if name != "none")
 ENERGY_TOLERANCE = 0.005
+ROUNDING_SHARE = 0.04  # of a pixel's noise that rounding may make of it
 FLAT = [name for name in CASES if name.startswith("flat")]
 SHAPED = [name for name in CASES if not name.startswith("flat")]
 FOLDED = [name for name in CASES if name.startswith("sine-folds")]
@@ -56,21 +61,38 @@ def render(scene: Scene, method: str) -> Frame:
         backend=BACKEND,
         aovs=("caustic_irradiance",),
         specular_view=False,
+        options=METHODS[method].unbiased_options,
     ) as renderer:
         return renderer.render(time=0.0)
 
 
-@cache
 def measured(name: str, method: str) -> FloatArray:
     """Caustic irradiance (128, 128, 3) of a case, W/m^2; skips where the method does not take such a scene."""
+    return shot(name, method)[0]
+
+
+@cache
+def shot(name: str, method: str) -> tuple[FloatArray, float]:
+    """Caustic irradiance (128, 128, 3) of a case, W/m^2, and the mean flux of a photon that lands, W."""
     case: PhysicsCase = case_of(name)
     refuse_if_it_does_not_apply(case.scene, method)
     frame = render(case.scene, method)
     image = frame.aov["caustic_irradiance"]
     assert image.shape == (SIZE[1], SIZE[0], 3) and image.dtype == np.float32
     assert np.isfinite(image).all()
-    print(f"\n{method} {name}: solves {json.dumps(frame.stats['solves'])}")
-    return box_filter(image, (BINS, BINS))
+    solves = frame.stats["solves"]
+    print(f"\n{method} {name}: solves {json.dumps(solves)}")
+    photons = sum(s["converged"] + s["bracketed"] for s in solves)
+    return box_filter(image, (BINS, BINS)), sum(s["flux_landed"] for s in solves) / max(photons, 1)
+
+
+def noise(name: str, method: str) -> FloatArray:
+    """Standard deviation of a bin's irradiance (128, 128, 3) that the method states, W/m^2; 0 for those without noise."""
+    case, share = case_of(name), METHODS[method].noise_share
+    if share == 0.0:
+        return np.zeros_like(case.reference)
+    flux_w = shot(name, method)[1]
+    return np.asarray(share * np.sqrt(case.reference * flux_w / case.bin_area_m2))
 
 
 def relative_rmse(image: FloatArray, reference: FloatArray) -> float:
@@ -83,7 +105,8 @@ def test_flat_water_is_exact_in_every_bin(name: str, method: str) -> None:
     case, image = case_of(name), measured(name, method)
     ratio = image[case.region] / case.reference[case.region]
     print(f"{method} {name}: E / E_ref mean {ratio.mean():.5f}, from {ratio.min():.5f} to {ratio.max():.5f}")
-    assert np.abs(ratio - 1.0).max() < case.tolerance
+    allowed = case.tolerance + 5.0 * noise(name, method)[case.region] / case.reference[case.region]
+    assert (np.abs(ratio - 1.0) < allowed).all()
 
 
 @pytest.mark.parametrize("method", NAMES)
@@ -91,8 +114,9 @@ def test_flat_water_is_exact_in_every_bin(name: str, method: str) -> None:
 def test_relative_rmse(name: str, method: str) -> None:
     case, image = case_of(name), measured(name, method)
     error = relative_rmse(image[case.region], case.reference[case.region])
-    print(f"{method} {name}: relative RMSE {error:.4f}")
-    assert error < case.tolerance
+    noisy = float(np.sqrt((noise(name, method)[case.region] ** 2).mean()) / case.reference[case.region].mean())
+    print(f"{method} {name}: relative RMSE {error:.4f}, of which noise may be {noisy:.4f}")
+    assert error < np.hypot(case.tolerance, noisy)
 
 
 @pytest.mark.parametrize("method", NAMES)
@@ -136,6 +160,16 @@ def bin_width_m(case: PhysicsCase) -> float:
     return 2.0 * case.half_extent_m / BINS
 
 
+def pixel_noise(name: str, method: str, frame: Frame) -> float:
+    """Relative RMSE of a single pixel that the method's noise makes. Rounding moves few photons over a pixel's border."""
+    case, share = case_of(name), METHODS[method].noise_share
+    photons = sum(s["converged"] + s["bracketed"] for s in frame.stats["solves"])
+    flux_w = sum(s["flux_landed"] for s in frame.stats["solves"]) / max(photons, 1)
+    area_m2 = (2.0 * case.half_extent_m / SIZE[0]) ** 2
+    mean = float(frame.aov["caustic_irradiance"].mean())
+    return float(share * np.sqrt(mean * flux_w / area_m2) / mean)
+
+
 @pytest.mark.parametrize("factor", [0.001, 1000.0])
 @pytest.mark.parametrize("method", NAMES)
 @pytest.mark.parametrize("name", ["sine-folds", "flat-point", "sphere-absorbing", "nephroid"])
@@ -148,5 +182,6 @@ def test_scale_changes_nothing(name: str, method: str, factor: float) -> None:
     caustic = relative_rmse(other.aov["caustic_irradiance"].astype(np.float64), reference)
     print(f"{method} {name} x {factor:g}: RMSE {ldr:.2e} of the picture, {caustic:.2e} of the caustic")
     assert reference.mean() > 0.0
-    assert ldr < 1e-3
-    assert caustic < 1e-3
+    rounding = ROUNDING_SHARE * pixel_noise(name, method, frame)
+    assert ldr < 1e-3 + rounding
+    assert caustic < 1e-3 + rounding

@@ -21,7 +21,7 @@ float contradiction(ivec2 pixel) {
     float spread = max(sum.y / sum.w - mean * mean, 1e-6 * sum.y / sum.w);
     float by_mean = mean * mean * sum.w / spread;                 // squared t statistic
     float by_pattern = sum.y / max(sum.z, 1e-3 * sum.y);          // 1 if the noise explains it
-    return max(smoothstep(12.0, 48.0, by_mean), smoothstep(3.0, 9.0, by_pattern));
+    return max(smoothstep(12.0, 36.0, by_mean), smoothstep(2.5, 6.0, by_pattern));
 }
 
 void main() {

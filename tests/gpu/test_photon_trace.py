@@ -1,0 +1,219 @@
+"""Photon tracing and its denoiser: energy against the number of photons, chance against split, what the light does not see,
+the mean that the filter keeps, the noise that it takes, NaN in its history, and light that moves.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import glcaustics as glc
+from glcaustics.caustics.method import IRRADIANCE
+from glcaustics.denoise import svgf
+from glcaustics.scene.model import Scene
+from glcaustics.scene.water import Wave, WaveSurface, make_water
+from tests.gpu.feature_scenes import WATER, box, from_above, plane, scene_of, sheet, sun
+from tests.gpu.physics_scenes import CASES, PhysicsCase
+
+pytestmark = pytest.mark.gpu
+BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
+FloatArray = npt.NDArray[np.float64]
+case_of = cache(lambda name: CASES[name]())
+
+
+def open_renderer(scene: Scene, size: int = 128, seed: int = 0, stats: bool = True, **options: Any) -> glc.Renderer:
+    return glc.Renderer(
+        scene,
+        size=(size, size),
+        method="photon_trace",
+        quality="low",
+        backend=BACKEND,
+        aovs=("caustic_irradiance",),
+        specular_view=False,
+        seed=seed,
+        stats=stats,
+        options=options,
+    )
+
+
+def green(frame: glc.renderer.Frame) -> FloatArray:
+    return frame.aov["caustic_irradiance"][..., 1].astype(np.float64)
+
+
+def landed_flux(case: PhysicsCase, image: FloatArray) -> float:
+    """Flux over the whole view, W."""
+    return float(image.mean() * (2.0 * case.half_extent_m) ** 2)
+
+
+# -- photons ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("photons", [1_000, 10_000, 100_000, 1_000_000])
+def test_any_number_of_photons_carries_the_same_flux(photons: int) -> None:
+    """Relative noise of the total is far below that of independent photons, which would be 1 / sqrt(photons)."""
+    case = case_of("sine-folds")
+    with open_renderer(case.scene, photons=photons, denoise=False) as renderer:
+        frame = renderer.render()
+    ratio = landed_flux(case, green(frame)) / case.flux_w[1]
+    print(f"{photons} photons: flux {ratio:.5f} of the truth")
+    assert ratio == pytest.approx(1.0, abs=0.002 + 1.0 / np.sqrt(photons))
+    assert frame.stats["solves"][0]["rays"] == pytest.approx(photons, rel=0.1)
+
+
+def test_every_frame_draws_other_photons_and_every_seed_too() -> None:
+    case = case_of("sine-folds")
+    images = []
+    for seed in (0, 0, 1):
+        with open_renderer(case.scene, photons=10_000, denoise=False, seed=seed) as renderer:
+            images.append([green(renderer.render()) for _ in range(2)])
+    assert np.array_equal(images[0], images[1])
+    assert not np.array_equal(images[0][0], images[0][1])
+    assert not np.array_equal(images[0][0], images[2][0])
+
+
+def test_chance_has_the_mean_of_split() -> None:
+    """Fresnel's choice by chance: the same expectation from half of the work; mean over 8 frames, 4 x 4 blocks."""
+    case = case_of("sphere")
+    means = {}
+    for fresnel in ("split", "chance"):
+        with open_renderer(case.scene, photons=200_000, denoise=False, fresnel=fresnel) as renderer:
+            frames = [renderer.render() for _ in range(8)]
+        means[fresnel] = np.mean([green(f) for f in frames], axis=0)
+        rays = [s["rays"] for s in frames[0].stats["solves"]]
+        print(fresnel, "rays", rays, "mean", means[fresnel].mean())
+        assert (len(set(rays)) == 1) == (fresnel == "split")
+    assert means["chance"].mean() == pytest.approx(means["split"].mean(), rel=0.005)
+    blocks = [m.reshape(4, 32, 4, 32).mean(axis=(1, 3)) for m in means.values()]
+    np.testing.assert_allclose(blocks[1], blocks[0], atol=0.03 * blocks[0].mean())
+
+
+def hidden_ceiling() -> tuple[Scene, float, float]:
+    """Flat water, the sun at 45 degrees, and a slab that hangs where the water throws the light to: its underside is seen by
+    no light, only by the eye. Scene, and the slab's height and half width.
+    """
+    scene = scene_of(
+        [
+            plane("floor", 4.0, -1.0),
+            sheet("water", 1.0, 0.0),
+            box("slab", (2.4, 0.1, 2.4), (1.6, 1.45, 0.0)),
+        ],
+        [sun(45.0)],
+        from_above(3.0, -1.0),
+    )
+    return scene, 1.4, 1.2
+
+
+def test_reflective_caustics_where_the_light_does_not_see() -> None:
+    """The underside of a slab, which only the eye's view holds: E = E_perp cos(45 deg) R on all that it shows."""
+    from dataclasses import replace
+
+    from glcaustics.optics.fresnel import fresnel_dielectric
+    from glcaustics.scene.model import Camera
+
+    scene, height, _ = hidden_ceiling()
+    below = Camera.look_at((1.6, 0.2, 0.0), (1.6, height, 0.0), (0.0, 0.0, 1.0), yfov_rad=0.8)
+    seen = replace(scene, camera=below)
+    with open_renderer(seen, photons=400_000, denoise=False) as renderer:
+        frame = renderer.render()
+    image = green(frame)
+    expected = np.cos(np.radians(45.0)) * float(fresnel_dielectric(np.cos(np.radians(45.0)), 1.0, 1.333))
+    reflected = next(s for s in frame.stats["solves"] if "reflect" in s["solve"])
+    print("mean", image.mean(), "closed form", expected, reflected["flux_landed_by_view"])
+    assert reflected["flux_landed_by_view"].get("by_eye_view", 0.0) > 0.9 * reflected["flux_landed"]
+    assert image.mean() == pytest.approx(expected, rel=0.02)
+    with glc.Renderer(
+        seen, (128, 128), "caustic_map", backend=BACKEND, aovs=("caustic_irradiance",), specular_view=False
+    ) as other:
+        assert green(other.render()).mean() < 0.1 * expected
+
+
+# -- denoiser ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_filter_keeps_the_mean_and_takes_the_noise() -> None:
+    """16 frames of a static view: the mean within 1 %, at least 80 % of the noise's spread over seeds gone."""
+    case = case_of("sine-folds")
+    noisy, filtered = [], []
+    for seed in range(4):
+        with open_renderer(case.scene, photons=30_000, denoise=False, seed=seed, stats=False) as renderer:
+            noisy.append(green(renderer.render()))
+        with open_renderer(case.scene, photons=30_000, seed=seed, stats=False) as renderer:
+            first = green(renderer.render())
+            filtered.append([green(renderer.render()) for _ in range(15)][-1])
+        assert landed_flux(case, first) == pytest.approx(case.flux_w[1], rel=0.01)
+    spread = [np.sqrt((np.std(x, axis=0, ddof=1) ** 2).mean()) for x in (noisy, filtered)]
+    kept = landed_flux(case, np.mean(filtered, axis=0)) / case.flux_w[1]
+    print(f"noise {spread[0]:.4f} -> {spread[1]:.4f} ({spread[1] / spread[0]:.3f}); mean {kept:.5f}")
+    assert kept == pytest.approx(1.0, abs=0.01)
+    assert spread[1] < 0.2 * spread[0]
+
+
+@pytest.mark.parametrize("poison", [np.nan, np.inf])
+def test_a_poisoned_history_is_gone_within_one_frame(poison: float) -> None:
+    case = case_of("sine-folds")
+    with open_renderer(case.scene, photons=30_000) as renderer:
+        before = [green(renderer.render()) for _ in range(4)][-1]
+        with renderer.device.guard_state():
+            texture = renderer._runner.texture(svgf.COLOR)  # type: ignore[union-attr]
+            values = np.frombuffer(texture.read(), np.float32).reshape(texture.height, texture.width, 4).copy()
+            values[20:90, 30:100] = poison
+            texture.write(values.tobytes())
+        after = green(renderer.render())
+    assert np.isfinite(after).all()
+    assert after.mean() == pytest.approx(before.mean(), rel=0.01)
+
+
+def wavy() -> Scene:
+    """A wave of half a metre that focuses to bright lines and runs by a quarter of its length in a second."""
+    k = 2.0 * np.pi / 0.5
+    surface = WaveSurface([Wave(2.0 / k**2, k, 0.0, 0.0, 0.5 * np.pi, 0.0)])
+    water = make_water("water", WATER, surface, size_m=(2.0, 2.0), resolution=(384, 16), center_m=(0.0, 0.0, 0.0))
+    return scene_of([plane("floor", 2.0, -1.0)], [sun()], from_above(1.6, -1.0), waters=(water,))
+
+
+def test_a_moving_caustic_is_where_it_is() -> None:
+    """After 16 static frames the water moves on by a quarter of a wave. Three frames later the picture is that of a
+    filter which never saw the old place, and the bright lines stand within half a pixel of the truth.
+    """
+    scene, truth = wavy(), []
+    for time in (0.0, 1.0):
+        with open_renderer(scene, photons=400_000, denoise=False, stats=False) as renderer:
+            truth.append(np.mean([green(renderer.render(time)) for _ in range(4)], axis=0))
+    with open_renderer(scene, photons=100_000, stats=False) as renderer:
+        settled = [green(renderer.render(0.0)) for _ in range(16)][-1]
+        moved = [green(renderer.render(1.0)) for _ in range(3)][-1]
+    with open_renderer(scene, photons=100_000, stats=False) as renderer:
+        fresh = [green(renderer.render(1.0)) for _ in range(3)][-1]
+    contrast = truth[1] - truth[0]
+    images = (settled, fresh, moved)
+    where = [float(((image - truth[0]) * contrast).sum() / (contrast**2).sum()) for image in images]
+    print(f"0 = old place, 1 = new: before {where[0]:.3f}, three frames after {where[2]:.3f}, afresh {where[1]:.3f}")
+    assert abs(where[0]) < 0.05
+    assert where[2] > where[1] - 0.05
+    shift = phase_shift_px(moved[32:96], truth[1][32:96])
+    print("shift of the pattern, pixels:", shift)
+    assert abs(shift) < 0.5
+    assert moved.mean() == pytest.approx(truth[1].mean(), rel=0.01)
+
+
+def phase_shift_px(image: FloatArray, reference: FloatArray) -> float:
+    """By how much a pattern stands to the right of another: phase at the reference's strongest frequency."""
+    spectra = [np.fft.rfft(x.mean(axis=0) - x.mean()) for x in (image, reference)]
+    k = int(np.argmax(np.abs(spectra[1])[4:])) + 4
+    return float(-np.angle(spectra[0][k] / spectra[1][k]) / (2.0 * np.pi * k) * image.shape[1])
+
+
+def test_the_plan_has_the_filter_between_noise_and_frame() -> None:
+    case = case_of("sine")
+    with open_renderer(case.scene, photons=1_000) as renderer:
+        names = [step.name for step in renderer.plan.steps]
+        assert {"svgf.reproject", "svgf.accumulate", "svgf.atrous_0"} <= set(names)
+        assert svgf.COLOR in renderer.plan.history_slots and IRRADIANCE in renderer.plan.slots
+    with open_renderer(case.scene, photons=1_000, denoise=False) as renderer:
+        assert not any(step.name.startswith("svgf") for step in renderer.plan.steps)
+        assert not renderer.plan.history_slots
