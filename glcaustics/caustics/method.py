@@ -29,7 +29,7 @@ class CausticsMethod(ABC):
         name: as in `--method`. summary: one line. paper: author, year, title.
         ladder: quality -> options; more cost and less error from step to step.
         option_help: option -> one line with its unit and range.
-        noisy: it has the option "denoise"; with it, it writes `NOISY_IRRADIANCE`, which the denoiser turns into the irradiance.
+        noisy: it has the option "denoise"; with it, it writes `NOISY_IRRADIANCE`, which the denoiser takes.
         noise_share: standard deviation of its noise as a share of that of independent photons (Poisson), at most.
         unbiased_options: under which its mean is the truth: what closed forms are tested with.
     """

@@ -1,9 +1,10 @@
-"""Cascaded image-space photon tracing (Meenrattanakorn, Lambers 2022): photons go from what the light sees of specular surfaces
-through the light's view, then through the camera's, and are added up as irradiance at the camera's pixels.
+"""Cascaded image-space photon tracing (Meenrattanakorn, Lambers 2022): photons go from what the light sees of specular
+surfaces through the light's view, then through the camera's, and are added up as irradiance at the camera's pixels.
 
-Beyond the paper: photons are stratified and carry the exact flux of their stratum; ends are exact on tangent planes; hierarchical
-marching; irradiance over the receiver's own area, so that energy holds on slanted receivers; refraction and reflection weighted by
-Fresnel's equations instead of by chance (which is an option); solids, dispersion and absorption; every loss counted.
+Beyond the paper: photons are stratified and carry the exact flux of their stratum; ends are exact on tangent planes;
+hierarchical marching; irradiance over the receiver's own area, so that energy holds on slanted receivers; refraction
+and reflection weighted by Fresnel's equations instead of by chance (which is an option); solids, dispersion and
+absorption; every loss counted.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Spatiotemporal variance-guided filtering (Schied et al. 2017) of irradiance at the camera's pixels.
 
-Beyond the paper: histories in 32-bit floats; a history that is dropped where the new frame contradicts it by more than its noise, in
-the mean or in the pattern (after Schied, Peters, Dachsbacher 2018, but without re-shaded samples); an a-trous filter in conservative
-form, so that the sum over the picture stays what it was, however sparse and bright the samples are.
+Beyond the paper: histories in 32-bit floats; a history that is dropped where the new frame contradicts it by more than
+its noise, in the mean or in the pattern (after Schied, Peters, Dachsbacher 2018, but without re-shaded samples); an
+a-trous filter in conservative form, so that the sum over the picture stays what it was, however sparse and bright the
+samples are.
 """
 
 from __future__ import annotations

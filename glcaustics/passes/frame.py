@@ -395,7 +395,11 @@ class PassContext:
         self._history = history or {}
 
     def history(self, resource: str) -> moderngl.Texture:
-        """A declared history: the resource as the last frame left it, zero before the first. Raises GraphError otherwise."""
+        """A declared history: the resource as the last frame left it, zero before the first.
+
+        Raises:
+            GraphError: not declared.
+        """
         check_history(self.step, resource)
         return self._history[resource]
 

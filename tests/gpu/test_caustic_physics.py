@@ -7,7 +7,7 @@ over the whole view (sphere: over that disc) against the entered flux times tran
 
 Noisy methods run with their `unbiased_options`. Each states, as `noise_share`, the standard deviation of its noise as a
 share of that of independent photons, whose variance in a bin is E x (flux of a photon) / (area of the bin). Tolerances
-widen by that noise: RMSE in quadrature, single bins by five standard deviations. Energy, encircled flux and folds do not.
+widen by that noise: RMSE in quadrature, single bins by five standard deviations. Energy, encircled flux, folds do not.
 
 A method is left out of a case only where it declares by `why_not` that such a scene does not need it.
 """
@@ -87,7 +87,7 @@ def shot(name: str, method: str) -> tuple[FloatArray, float]:
 
 
 def noise(name: str, method: str) -> FloatArray:
-    """Standard deviation of a bin's irradiance (128, 128, 3) that the method states, W/m^2; 0 for those without noise."""
+    """Standard deviation of a bin's irradiance (128, 128, 3) that the method states, W/m^2; 0 without noise."""
     case, share = case_of(name), METHODS[method].noise_share
     if share == 0.0:
         return np.zeros_like(case.reference)
@@ -161,7 +161,7 @@ def bin_width_m(case: PhysicsCase) -> float:
 
 
 def pixel_noise(name: str, method: str, frame: Frame) -> float:
-    """Relative RMSE of a single pixel that the method's noise makes. Rounding moves few photons over a pixel's border."""
+    """Relative RMSE of a single pixel by the method's noise, of which rounding may make a part: photons on borders."""
     case, share = case_of(name), METHODS[method].noise_share
     photons = sum(s["converged"] + s["bracketed"] for s in frame.stats["solves"])
     flux_w = sum(s["flux_landed"] for s in frame.stats["solves"]) / max(photons, 1)

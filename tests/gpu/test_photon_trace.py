@@ -1,5 +1,5 @@
-"""Photon tracing and its denoiser: energy against the number of photons, chance against split, what the light does not see,
-the mean that the filter keeps, the noise that it takes, NaN in its history, and light that moves.
+"""Photon tracing and its denoiser: energy against the number of photons, chance against split, what the light does not
+see, the mean that the filter keeps, the noise that it takes, NaN in its history, and light that moves.
 """
 
 from __future__ import annotations
@@ -93,8 +93,8 @@ def test_chance_has_the_mean_of_split() -> None:
 
 
 def hidden_ceiling() -> tuple[Scene, float, float]:
-    """Flat water, the sun at 45 degrees, and a slab that hangs where the water throws the light to: its underside is seen by
-    no light, only by the eye. Scene, and the slab's height and half width.
+    """Flat water, the sun at 45 degrees, and a slab that hangs where the water throws the light to: its underside is
+    seen by no light, only by the eye. Scene, and the slab's height and half width.
     """
     scene = scene_of(
         [
