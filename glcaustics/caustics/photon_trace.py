@@ -39,7 +39,7 @@ LOST = {
     -6: "normal_faces_away",
     -7: "met_another_specular_surface",
 }
-FRESNEL = ("split", "chance")
+CHOICES = {"fresnel": ("split", "chance"), "march": ("hierarchical", "dda")}
 GOLDEN_3D = 1.2207440846057596  # root of x^4 = x + 1: the R3 sequence (Roberts 2018)
 
 
@@ -91,7 +91,8 @@ class PhotonTrace(CausticsMethod):
         "map_size": "the receivers' light view has about this^2 texels (8..8192)",
         "max_iterations": "of the intersection estimate in the light's view (1..64)",
         "march_steps": "of the march in the light's view where the estimate fails, and of reflected photons (1..512)",
-        "view_steps": "of the hierarchical march in the camera's view (8..16384)",
+        "view_steps": "of the march in the camera's view (8..16384)",
+        "march": "in the camera's view: hierarchical, or dda: pixel by pixel, the paper's, as a baseline",
         "internal_bounces": "total reflections followed inside a solid (0..32)",
         "fresnel": "split: every photon is refracted and reflected, weighted; chance: one of both, drawn",
         "reflect": "follow light that water and glass throw back (true, false)",
@@ -102,6 +103,7 @@ class PhotonTrace(CausticsMethod):
     }
     defaults: ClassVar[Mapping[str, Any]] = {
         "fresnel": "split",
+        "march": "hierarchical",
         "reflect": True,
         "dispersion": True,
         "denoise": True,
@@ -118,9 +120,10 @@ class PhotonTrace(CausticsMethod):
             if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
                 remedy = f"give a whole number from {low} to {high}"
                 raise UsageError(f"option {name} is {value!r}", where=cls.name, remedy=remedy)
-        if options["fresnel"] not in FRESNEL:
-            remedy = f"use one of {', '.join(FRESNEL)}"
-            raise UsageError(f"option fresnel is {options['fresnel']!r}", where=cls.name, remedy=remedy)
+        for name, words in CHOICES.items():
+            if options[name] not in words:
+                remedy = f"use one of {', '.join(words)}"
+                raise UsageError(f"option {name} is {options[name]!r}", where=cls.name, remedy=remedy)
         for name in cls.flags:
             if not isinstance(options[name], bool):
                 raise UsageError(f"option {name} is {options[name]!r}", where=cls.name, remedy="use true or false")
@@ -181,8 +184,7 @@ class PhotonTrace(CausticsMethod):
                     light.resource(f"receiver.{branch.view}.position_ws"),
                     light.resource(f"receiver.{branch.view}.normal_ws"),
                     "gbuffer.plane",
-                    "depth_chain.bounds_4",
-                    "depth_chain.bounds_16",
+                    *_march_reads(setup).values(),
                     *(back if branch.kind == SOLID else ()),
                 ),
                 note=f"where {branch.words} photons land",
@@ -201,6 +203,7 @@ class PhotonTrace(CausticsMethod):
             "RECEIVER_FACES": view.faces,
             "BRANCH": BRANCH_CODE[branch.kind],
             "CHANCE": int(options["fresnel"] == "chance"),
+            "DDA": int(options["march"] == "dda"),
             "HAS_MIRROR": int(branch.kind == REFLECT and OpticalKind.MIRROR in ctx.setup.kinds()),
         }
         program = ctx.device.program(f"{SHADERS}/trace", defines)
@@ -219,8 +222,7 @@ class PhotonTrace(CausticsMethod):
                 "t_receiver_position": ctx.texture(light.resource(f"receiver.{branch.view}.position_ws")),
                 "t_receiver_normal": ctx.texture(light.resource(f"receiver.{branch.view}.normal_ws")),
                 "t_plane": ctx.texture("gbuffer.plane"),
-                "t_bounds_4": ctx.texture("depth_chain.bounds_4"),
-                "t_bounds_16": ctx.texture("depth_chain.bounds_16"),
+                **{name: ctx.texture(resource) for name, resource in _march_reads(ctx.setup).items()},
                 "t_objects": ctx.frame.gpu.objects,
                 "u_photon_grid": photon_grid(int(options["photons"]), light.caster),
                 "u_sequence": sequence(ctx.frame.index),
@@ -270,6 +272,13 @@ class PhotonTrace(CausticsMethod):
 
     def solve_stats(self, runner: PlanRunner) -> list[dict[str, Any]]:
         return [photon_statistics(branch, runner) for _, branch in self._traced]
+
+
+def _march_reads(setup: FrameSetup) -> dict[str, str]:
+    """Samplers and resources of the march in the camera's view, besides the planes."""
+    if setup.options["march"] == "dda":
+        return {"t_depth_m": "gbuffer.depth_m"}
+    return {"t_bounds_4": "depth_chain.bounds_4", "t_bounds_16": "depth_chain.bounds_16"}
 
 
 def photon_grid(photons: int, view: LightView) -> tuple[int, int]:

@@ -5,8 +5,12 @@
 #include "interface/raster.glsl"
 
 uniform sampler2D t_plane;       // of the camera's G-buffer
+#if DDA
+uniform sampler2D t_depth_m;
+#else
 uniform sampler2D t_bounds_4;
 uniform sampler2D t_bounds_16;
+#endif
 uniform int u_view_steps;
 
 #define PHOTON_BY_LIGHT_VIEW 1
@@ -102,7 +106,11 @@ void photon_march(vec3 o, vec3 d, float t0, float t1, inout PhotonLanding landin
     landing.status = PHOTON_OUTSIDE;
     if (part.y <= part.x) return;
     GlcRasterRay ray = glc_raster_ray(u_raster_from_world, u_raster_size, o + part.x * d, d, part.y - part.x);
+#if DDA
+    GlcSolve solve = glc_march_dda(t_depth_m, t_plane, u_camera_lens.z != 0.0, ray, u_view_steps);
+#else
     GlcSolve solve = glc_march_hierarchical(t_bounds_4, t_bounds_16, t_plane, ray, u_view_steps);
+#endif
     landing.lookups += solve.iterations;
     if (solve.status == GLC_SOLVE_HIT) {
         landing.t = part.x + glc_raster_distance(ray, solve.u);
