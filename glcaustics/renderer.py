@@ -286,6 +286,7 @@ class Renderer:
         self._gpu = GpuScene(self.device)
         self._time: float | None = None
         self._frames = 0
+        self._drawn: CameraState | None = None
         self._runner: PlanRunner | None = None
         self._declared: _Declared | None = None
         self._previous: tuple[CameraState, dict[str, Any]] | None = None
@@ -369,6 +370,7 @@ class Renderer:
         frame = self._frame_state(time, jitter_px)
         runner.run(frame)
         self._frames += 1
+        self._drawn = frame.camera
         if jitter_px == (0.0, 0.0):  # a shifted sample is no frame of its own: motion is counted from frame to frame
             self._previous = (frame.camera, {i.instance.name: i.world_from_object for i in self._gpu.items})
         if self._target is not None:
@@ -417,7 +419,7 @@ class Renderer:
         view = self.scene.view_at(time)
         camera = CameraState.make(view, self.size, self._setup.scene_bounds_ws, jitter_px, boxes)
         before, transforms = self._previous or (camera, {})
-        return FrameState(time, camera, before, self._gpu, self._exposure(), transforms, self._frames)
+        return FrameState(time, camera, before, self._gpu, self._exposure(), transforms, self._frames, self._drawn)
 
     def _exposure(self) -> float:
         """The scene's exposure, or one that shows a white surface in full light a stop above middle grey's."""

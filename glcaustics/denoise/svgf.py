@@ -98,7 +98,9 @@ def _geometry(ctx: PassContext) -> dict[str, Any]:
 
 
 def _reproject(ctx: PassContext) -> None:
-    before = ctx.frame.previous_camera
+    before = ctx.frame.history_camera or ctx.frame.previous_camera
+    counted_from = ctx.frame.previous_camera.jitter_uv
+    shift = (before.jitter_uv[0] - counted_from[0], before.jitter_uv[1] - counted_from[1])
     values = {
         **_geometry(ctx),
         "t_motion": ctx.texture(MOTION),
@@ -109,6 +111,7 @@ def _reproject(ctx: PassContext) -> None:
         "u_previous_world_from_camera": before.world_from_camera,
         "u_previous_lens": before.lens,
         "u_previous_jitter": before.jitter_uv,
+        "u_history_shift": shift,
     }
     _draw(ctx, "reproject", (REPROJECTED, REPROJECTED_MOMENTS), values)
 

@@ -367,7 +367,8 @@ class FrameState:
     gpu: GpuScene
     exposure: float
     previous_transforms: Mapping[str, FloatArray] = field(default_factory=dict)
-    index: int = 0  # frames drawn before this one
+    index: int = 0  # frames and shifted samples drawn before this one
+    history_camera: CameraState | None = None  # of the last picture drawn, shifted or not: what histories were seen by
 
     def uniforms(self) -> dict[str, Any]:
         return self.camera.uniforms()

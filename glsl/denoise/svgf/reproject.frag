@@ -9,6 +9,7 @@ uniform sampler2D t_previous_normal_ws;
 uniform mat4 u_previous_world_from_camera;
 uniform vec4 u_previous_lens;
 uniform vec2 u_previous_jitter;
+uniform vec2 u_history_shift;    // uv: of the picture that the history is, against the frame that motion is counted from
 
 in vec2 v_uv;
 layout(location = 0) out vec4 o_color;     // rgb: mean; w: frames in it, 0 = none
@@ -27,7 +28,7 @@ void main() {
     if (here.depth_m <= 0.0) return;
     vec2 motion = texelFetch(t_motion, pixel, 0).xy;
     if (!svgf_is_finite(vec4(motion, 0.0, 0.0))) return;
-    vec2 at = gl_FragCoord.xy - motion * vec2(size) - 0.5;
+    vec2 at = gl_FragCoord.xy + (u_history_shift - motion) * vec2(size) - 0.5;
     vec2 base = floor(at + 1e-4), f = max(at - base, vec2(0.0));
     vec4 weights = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
     float width = svgf_pixel_width(here.depth_m), total = 0.0;
