@@ -153,7 +153,7 @@ class PhotonTrace(CausticsMethod):
                 "photon_trace.scatter",
                 {output: self.irradiance_desc(setup)},
                 lambda ctx: self._scatter(ctx, output),
-                reads=tuple(r for _, b in self._traced for r in (b.landing, b.flux)),
+                reads=tuple(r for _, b in self._traced for r in (landing_of(b), b.flux)),
                 note="the photons added up at the camera's pixels",
                 view_dependent=True,
             )
@@ -176,7 +176,10 @@ class PhotonTrace(CausticsMethod):
         graph.add(
             PassDecl(
                 branch.pass_name("trace"),
-                {branch.landing: TextureDesc("rgba32f", size, "px"), branch.flux: TextureDesc("rgba32f", size, "lm")},
+                {
+                    landing_of(branch): TextureDesc("rgba32f", size, "px"),
+                    branch.flux: TextureDesc("rgba32f", size, "lm"),
+                },
                 lambda ctx: self._trace(ctx, light, branch),
                 reads=(
                     light.resource("caster.position_ws"),
@@ -236,7 +239,7 @@ class PhotonTrace(CausticsMethod):
                 "u_view_steps": int(options["view_steps"]),
             }
         )
-        ctx.device.draw_fullscreen(program, ctx.target(branch.landing, branch.flux))
+        ctx.device.draw_fullscreen(program, ctx.target(landing_of(branch), branch.flux))
 
     @staticmethod
     def _solid_uniforms(ctx: PassContext, light: LightSetup) -> dict[str, Any]:
@@ -254,7 +257,7 @@ class PhotonTrace(CausticsMethod):
         target.clear(0.0, 0.0, 0.0, 0.0)
         program = ctx.device.program(f"{SHADERS}/scatter")
         for _, branch in self._traced:
-            landing = ctx.texture(branch.landing)
+            landing = ctx.texture(landing_of(branch))
             program.set_all(
                 {
                     "t_landing": landing,
@@ -268,7 +271,7 @@ class PhotonTrace(CausticsMethod):
     # -- statistics ---------------------------------------------------------------------------------------------------
 
     def stats_resources(self) -> tuple[str, ...]:
-        return tuple(r for _, b in self._traced for r in (b.landing, b.flux))
+        return tuple(r for _, b in self._traced for r in (landing_of(b), b.flux))
 
     def solve_stats(self, runner: PlanRunner) -> list[dict[str, Any]]:
         return [photon_statistics(branch, runner) for _, branch in self._traced]
@@ -279,6 +282,11 @@ def _march_reads(setup: FrameSetup) -> dict[str, str]:
     if setup.options["march"] == "dda":
         return {"t_depth_m": "gbuffer.depth_m"}
     return {"t_bounds_4": "depth_chain.bounds_4", "t_bounds_16": "depth_chain.bounds_16"}
+
+
+def landing_of(branch: Branch) -> str:
+    """Where the photons of a branch land: pixel, 1 / area of the receiver within it, status."""
+    return branch.resource("landing_px")
 
 
 def photon_grid(photons: int, view: LightView) -> tuple[int, int]:
@@ -296,7 +304,7 @@ def sequence(index: int) -> tuple[float, float, float]:
 
 def photon_statistics(branch: Branch, runner: PlanRunner) -> dict[str, Any]:
     """Photons and their flux by what became of them. Reads two textures back."""
-    landing, flux = (read_rgba32f(runner, r) for r in (branch.landing, branch.flux))
+    landing, flux = (read_rgba32f(runner, r) for r in (landing_of(branch), branch.flux))
     status = np.rint(landing[..., 3]).astype(int)
     lumens = flux[..., :3].astype(np.float64).sum(axis=2) / max(sum(branch.channels), 1.0)
     tried = status != 0
