@@ -5,6 +5,7 @@ see, the mean that the filter keeps, the noise that it takes, NaN in its history
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -13,9 +14,13 @@ import numpy.typing as npt
 import pytest
 
 import glcaustics as glc
+from glcaustics.bench.scene_export import beam_scene
 from glcaustics.caustics.method import IRRADIANCE
 from glcaustics.denoise import svgf
-from glcaustics.scene.model import Scene
+from glcaustics.optics.fresnel import fresnel_dielectric
+from glcaustics.optics.receivers import PlaneGrid
+from glcaustics.optics.reference import BeamSettings, reference_map
+from glcaustics.scene.model import Camera, Scene
 from glcaustics.scene.water import Wave, WaveSurface, make_water
 from tests.gpu.feature_scenes import WATER, box, from_above, plane, scene_of, sheet, sun
 from tests.gpu.physics_scenes import CASES, PhysicsCase
@@ -110,11 +115,6 @@ def hidden_ceiling() -> tuple[Scene, float, float]:
 
 def test_reflective_caustics_where_the_light_does_not_see() -> None:
     """The underside of a slab, which only the eye's view holds: E = E_perp cos(45 deg) R on all that it shows."""
-    from dataclasses import replace
-
-    from glcaustics.optics.fresnel import fresnel_dielectric
-    from glcaustics.scene.model import Camera
-
     scene, height, _ = hidden_ceiling()
     below = Camera.look_at((1.6, 0.2, 0.0), (1.6, height, 0.0), (0.0, 0.0, 1.0), yfov_rad=0.8)
     seen = replace(scene, camera=below)
@@ -130,6 +130,25 @@ def test_reflective_caustics_where_the_light_does_not_see() -> None:
         seen, (128, 128), "caustic_map", backend=BACKEND, aovs=("caustic_irradiance",), specular_view=False
     ) as other:
         assert green(other.render()).mean() < 0.1 * expected
+
+
+def test_the_ceiling_of_flooded_cornell_against_beams() -> None:
+    """No part of it is seen by the lamp. Float64 beams over the analytic water; 32 x 32 bins, a fold is a few mm wide."""
+    bins, up = 32, (0.0, 0.0, -1.0)
+    scene = glc.load_scene("flooded-cornell")
+    camera = Camera.look_at((0.0, 1.2, 0.0), (0.0, 2.0, 0.0), up, yfov_rad=2.0 * np.arctan(1.0 / 0.8))
+    right, above = np.asarray(camera.world_from_camera)[:3, :2].T
+    corner = np.array([0.0, 2.0, 0.0]) - right + above
+    grid = PlaneGrid(tuple(corner), tuple(2.0 * right), tuple(-2.0 * above), (0.0, -1.0, 0.0), bins, bins)
+    settings = BeamSettings(cells=160, max_events=1)
+    reference = reference_map(beam_scene(scene), grid, settings, check_step=False).mean[..., 1]
+    with open_renderer(replace(scene, camera=camera), size=256, photons=1 << 19, caster_size=1024) as renderer:
+        frames = [green(renderer.render()) for _ in range(6)]
+    image = frames[-1].reshape(bins, 8, bins, 8).mean(axis=(1, 3))
+    error = float(np.sqrt(np.mean((image - reference) ** 2)) / reference.mean())
+    print(f"ceiling: mean {image.mean() / reference.mean():.4f} of the beams', relative RMSE {error:.4f}")
+    assert image.mean() == pytest.approx(reference.mean(), rel=0.02)
+    assert error < 0.1
 
 
 # -- denoiser ---------------------------------------------------------------------------------------------------------
