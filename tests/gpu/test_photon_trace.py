@@ -133,7 +133,7 @@ def test_reflective_caustics_where_the_light_does_not_see() -> None:
 
 
 def test_the_ceiling_of_flooded_cornell_against_beams() -> None:
-    """No part of it is seen by the lamp. Float64 beams over the analytic water; 32 x 32 bins, a fold is millimetres wide."""
+    """The lamp sees no part of it. Float64 beams over the analytic water; 32 x 32 bins."""
     bins, up = 32, (0.0, 0.0, -1.0)
     scene = glc.load_scene("flooded-cornell")
     camera = Camera.look_at((0.0, 1.2, 0.0), (0.0, 2.0, 0.0), up, yfov_rad=2.0 * np.arctan(1.0 / 0.8))
