@@ -161,7 +161,7 @@ def bin_width_m(case: PhysicsCase) -> float:
 
 
 def pixel_noise(name: str, method: str, frame: Frame) -> float:
-    """Relative RMSE of a single pixel with independent photons of the frame's mean flux; 0 for methods without noise."""
+    """Relative RMSE of a single pixel with independent photons of the frame's mean flux; 0 without noise."""
     case, solves = case_of(name), frame.stats["solves"]
     if METHODS[method].noise_share == 0.0:
         return 0.0
