@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 
 from glcaustics.errors import UsageError
 from glcaustics.renderer import Renderer
+from glcaustics.scene.load import load_scene
 from glcaustics.scene.model import Camera, FloatArray, Scene
 
 SOLVED_BY_NEWTON, SOLVED_BY_MARCHING = 1, 5  # of `solve_status`
@@ -106,3 +108,44 @@ def eye_convergence(
         tuple(wrong),
         *others,
     )
+
+
+def _print_view(index: int, found: EyeConvergence) -> None:
+    print(f"view {index}: {found.pixels} specular pixels, {found.resolvable:.3f} of them resolvable")
+    for name in ("within_1px", "reported", "wrong"):
+        print(f"  {name:12s}" + " ".join(f"{share:.4f}" for share in getattr(found, name)))
+    print(f"  cascade {found.cascade:.4f}  hierarchical {found.hierarchical:.4f}")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """`python -m glcaustics.bench.eye_rays SCENE`: convergence and cost over seeded views, grazing ones among them."""
+    from glcaustics.bench.eye_cost import eye_cost
+
+    parser = argparse.ArgumentParser(prog="python -m glcaustics.bench.eye_rays", description=main.__doc__)
+    parser.add_argument("scene")
+    parser.add_argument("--views", type=int, default=6)
+    parser.add_argument("--size", default="1280x720")
+    parser.add_argument("--backend", default="auto")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--rounds", type=int, default=5, help="frames a cost is the median of; 0: no costs")
+    parser.add_argument("--cost-only", action="store_true")
+    chosen = parser.parse_args(arguments)
+    width, height = map(int, chosen.size.split("x"))
+    scene = load_scene(chosen.scene)
+    for index, camera in enumerate(seeded_cameras(scene, chosen.views, chosen.seed)):
+        if not chosen.cost_only:
+            counts = range(1, 9)
+            _print_view(index, eye_convergence(scene, camera, (width, height), counts, backend=chosen.backend))
+        for reflections in (True, False) if chosen.rounds else ():
+            costs = eye_cost(
+                scene, camera, (width, height), rounds=chosen.rounds, reflections=reflections, backend=chosen.backend
+            )
+            print(f"view {index}: cost in fetch passes, {'with' if reflections else 'without'} reflections")
+            for solver, parts in costs.items():
+                stages = "  ".join(f"{name} {cost:.2f}" for name, cost in parts.items() if name != "total")
+                ratio = parts["total"] / costs["dda"]["total"]
+                print(f"  {solver:12s} {parts['total']:6.2f}  {ratio:.2f} of dda   {stages}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -70,53 +70,58 @@ GlcSolve glc_march_hierarchical(sampler2D t_bounds_4, sampler2D t_bounds_16, sam
     vec2 ahead = vec2(greaterThan(inverse, vec2(0.0)));
     float pixels = max(max(abs(ray.step.x), abs(ray.step.y)) * ray.u_screen, 1.0);
     float du = ray.u_screen / pixels, count = ceil(pixels), at = 0.0, cell = 4.0;
-    bool front = true;
-    for (int i = 0; i < max_steps; ++i) {
-        float u = min(at * du, ray.u_screen);
-        vec3 p = ray.start + u * ray.step;
-        vec2 px = clamp(p.xy, vec2(0.0), last + 0.999);
-        vec2 index = floor(px / cell);
-        float next = at + 1.0;
-        bool over, under;   // in front of all of the cell; behind all of it as before
-        if (cell > 1.0) {
-            vec2 leaves = ((index + ahead) * cell - ray.start.xy) * inverse;
-            float u_exit = clamp(min(leaves.x, leaves.y), u, ray.u_screen);
-            float s_exit = ray.start.z + u_exit * ray.step.z;
-            vec2 bounds = cell > 4.0 ? texelFetch(t_bounds_16, ivec2(index), 0).rg : texelFetch(t_bounds_4, ivec2(index), 0).rg;
-            over = min(p.z, s_exit) > bounds.x;
-            under = !front && max(p.z, s_exit) < bounds.y;
-            next = max(next, ceil(u_exit / du));
-        } else {
-            vec4 plane = texelFetch(t_plane, ivec2(index), 0);
-            over = plane.w <= 0.0 || p.z > plane.z + dot(plane.xy, index + 0.5);
-            under = !over;
-            if (under && front) {
+    bool front = true, entered = false, ended = false;
+    int i = 0;
+    // The inner loop only walks: what a software renderer runs for every pixel of a group, taken or not, stays small.
+    for (int candidate = 0; candidate < 8 && i < max_steps && !ended; ++candidate) {
+        for (; i < max_steps; ++i) {
+            float u = min(at * du, ray.u_screen);
+            vec3 p = ray.start + u * ray.step;
+            vec2 px = clamp(p.xy, vec2(0.0), last + 0.999);
+            vec2 index = floor(px / cell);
+            float next = at + 1.0;
+            bool over, under;   // in front of all of the cell; behind all of it as before
+            if (cell > 1.0) {
+                vec2 leaves = ((index + ahead) * cell - ray.start.xy) * inverse;
+                float u_exit = clamp(min(leaves.x, leaves.y), u, ray.u_screen);
+                float s_exit = ray.start.z + u_exit * ray.step.z;
+                vec2 bounds = cell > 4.0 ? texelFetch(t_bounds_16, ivec2(index), 0).rg : texelFetch(t_bounds_4, ivec2(index), 0).rg;
+                over = min(p.z, s_exit) > bounds.x;
+                under = !front && max(p.z, s_exit) < bounds.y;
+                next = max(next, ceil(u_exit / du));
+            } else {
+                vec4 plane = texelFetch(t_plane, ivec2(index), 0);
+                over = plane.w <= 0.0 || p.z > plane.z + dot(plane.xy, index + 0.5);
+                under = !over;
+                entered = under && front;
                 solve.u = u;
-                solve.iterations = i + 1;
-                if (glc_march_settle(t_plane, ray, 2.5 * du, solve)) return solve;
+                vec2 f = glc_raster_plane(ray, plane);
+                float met = f.x / (f.y < 0.0 ? f.y : -1e-30);
+                vec2 off = abs(ray.start.xy + met * ray.step.xy - index - 0.5);
+                if (crossed.status != GLC_SOLVE_HIT && f.y < 0.0 && met >= 0.0 && met <= 1.0 && max(off.x, off.y) <= GLC_SOLVE_TOLERANCE_PX)
+                    crossed = GlcSolve(met, met, index, max(off.x, off.y), GLC_SOLVE_HIT, i + 1);
             }
-            vec2 f = glc_raster_plane(ray, plane);
-            float met = f.x / (f.y < 0.0 ? f.y : -1e-30);
-            vec2 off = abs(ray.start.xy + met * ray.step.xy - index - 0.5);
-            if (crossed.status != GLC_SOLVE_HIT && f.y < 0.0 && met >= 0.0 && met <= 1.0 && max(off.x, off.y) <= GLC_SOLVE_TOLERANCE_PX)
-                crossed = GlcSolve(met, met, index, max(off.x, off.y), GLC_SOLVE_HIT, i + 1);
-        }
-        solve.iterations = i + 1;
-        if (over || under) {
-            front = over;
-            at = next;
-            if (at > count) {
-                solve.status = ray.u_screen < 1.0 ? GLC_SOLVE_OFFSCREEN : (front ? GLC_SOLVE_NOTHING : GLC_SOLVE_HIDDEN);
-                break;
+            solve.iterations = i + 1;
+            if (over || under) {
+                front = over;
+                at = next;
+                if (at > count) {
+                    ended = true;
+                }
+                if (over) solve.u_front = min((at - 1.0) * du, ray.u_screen);
+                // Up again only where a new coarser cell begins, so that the march does not flutter between levels.
+                vec2 coarser = floor((ray.start.xy + at * du * ray.step.xy) / (4.0 * cell));
+                if (cell < 16.0 && coarser != floor(px / (4.0 * cell))) cell *= 4.0;
+            } else {
+                cell *= 0.25;
             }
-            if (over) solve.u_front = min((at - 1.0) * du, ray.u_screen);
-            // Up again only where a new coarser cell begins, so that the march does not flutter between levels.
-            vec2 coarser = floor((ray.start.xy + at * du * ray.step.xy) / (4.0 * cell));
-            if (cell < 16.0 && coarser != floor(px / (4.0 * cell))) cell *= 4.0;
-        } else {
-            cell *= 0.25;
+            if (entered || ended) break;
         }
+        i += 1;
+        if (entered && glc_march_settle(t_plane, ray, 2.5 * du, solve)) return solve;
+        entered = false;
     }
+    if (ended) solve.status = ray.u_screen < 1.0 ? GLC_SOLVE_OFFSCREEN : (front ? GLC_SOLVE_NOTHING : GLC_SOLVE_HIDDEN);
     solve.u = ray.u_screen;
     crossed.iterations = solve.iterations;
     if (crossed.status == GLC_SOLVE_HIT) return crossed;
