@@ -9,8 +9,7 @@ from glcaustics.caustics.displaced_mesh import DisplacedMesh
 from glcaustics.caustics.method import CausticsMethod
 from glcaustics.caustics.photon_trace import PhotonTrace
 from glcaustics.errors import UsageError
-from glcaustics.passes.geometry import TRANSMISSIVE_KINDS
-from glcaustics.scene.model import Scene
+from glcaustics.scene.model import OpticalKind, Scene
 
 METHODS: dict[str, type[CausticsMethod]] = {
     "caustic_map": CausticMap,
@@ -23,14 +22,14 @@ AUTO = "auto"
 
 
 def best_for(scene: Scene) -> type[CausticsMethod]:
-    """What "auto" takes: the displaced mesh where light is refracted, the caustic map where it is only reflected.
+    """What "auto" takes: the displaced mesh for water, the caustic map for solids and mirrors.
 
-    Relative RMSE and the light passes' time, one run on llvmpipe: peer-pool 0.0087 in 152 ms (medium) against 0.016 in
-    1065 ms (high); a glass sphere 0.0008 in 392 ms against 0.0019 in 482 ms; a mirror's nephroid 0.013 in 122 against
-    0.014 in 87 ms.
+    Relative RMSE and whole frames, each pair from one run on llvmpipe, quality medium. Water: peer-pool 0.0087 in 152 ms
+    against the map's 0.044 in 175 ms. Solids: glass-sphere beside its focus 0.044 in 576 ms against 0.015 in 236 ms,
+    glass-bunny 0.65 in 787 ms against 0.61 in 272 ms. Mirrors: a nephroid 0.013 in 122 ms against 0.014 in 87 ms.
     """
     kinds = {instance.optical_kind for instance in scene.instances_at(0.0)}
-    return DisplacedMesh if kinds & set(TRANSMISSIVE_KINDS) else CausticMap
+    return DisplacedMesh if OpticalKind.INTERFACE in kinds else CausticMap
 
 
 def pick(name: str, scene: Scene | None = None) -> type[CausticsMethod] | None:
