@@ -24,8 +24,8 @@ AUTO = "auto"
 def best_for(scene: Scene) -> type[CausticsMethod]:
     """What "auto" takes: the displaced mesh for water, the caustic map for solids and mirrors.
 
-    Relative RMSE and whole frames, each pair from one run on llvmpipe, quality medium. Water: peer-pool 0.0087 in 152 ms
-    against the map's 0.044 in 175 ms. Solids: glass-sphere beside its focus 0.044 in 576 ms against 0.015 in 236 ms,
+    Relative RMSE and whole frames, each pair from one run on llvmpipe, quality medium. Water: peer-pool 0.0087 in 152
+    ms against the map's 0.044 in 175 ms. Solids: glass-sphere beside its focus 0.044 in 576 ms against 0.015 in 236 ms,
     glass-bunny 0.65 in 787 ms against 0.61 in 272 ms. Mirrors: a nephroid 0.013 in 122 ms against 0.014 in 87 ms.
     """
     kinds = {instance.optical_kind for instance in scene.instances_at(0.0)}
