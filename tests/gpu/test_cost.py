@@ -1,4 +1,7 @@
-"""What a frame costs, as ratios within one run: the absolute times of these machines mean nothing."""
+"""What a frame costs, as ratios within one run: the absolute times of these machines mean nothing.
+
+Processor time of this process, all threads of the software renderer included: what else the machine does hardly enters.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +29,10 @@ def interleaved_medians(scene_name: str, size: tuple[int, int], methods: tuple[s
         for round_index in range(rounds + 1):  # the first one compiles and uploads
             for renderer, record in zip(renderers, times, strict=True):
                 renderer.device.make_current()
-                start = time.perf_counter()
+                start = time.process_time()
                 renderer.draw(0.05 * round_index)
                 renderer.device.ctx.finish()
-                record.append(time.perf_counter() - start)
+                record.append(time.process_time() - start)
     finally:
         for renderer in renderers:
             renderer.device.make_current()
@@ -37,8 +40,9 @@ def interleaved_medians(scene_name: str, size: tuple[int, int], methods: tuple[s
     return [1e3 * statistics.median(record[1:]) for record in times]
 
 
-def test_caustics_at_most_double_the_frame() -> None:
+@pytest.mark.parametrize("method", ["caustic_map", "displaced_mesh"])
+def test_caustics_at_most_double_the_frame(method: str) -> None:
     """Issue 2: `pool` at 1280x720, quality medium, in at most twice the cost of the same frame with caustics off."""
-    off, on = interleaved_medians("pool", (1280, 720), ("none", "caustic_map"), rounds=5)
-    print(f"pool 1280x720 medium: none {off:.0f} ms, caustic_map {on:.0f} ms, ratio {on / off:.2f}")
+    off, on = interleaved_medians("pool", (1280, 720), ("none", method), rounds=5)
+    print(f"pool 1280x720 medium: none {off:.0f} ms, {method} {on:.0f} ms, ratio {on / off:.2f}")
     assert on <= 2.0 * off
