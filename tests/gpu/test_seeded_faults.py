@@ -31,7 +31,6 @@ pytestmark = pytest.mark.gpu
 BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
 SIZE = 2 * BINS
 CLEARLY = 4.0  # times the healthy run's value
-METHOD = "caustic_map"
 
 FloatArray = npt.NDArray[np.float64]
 case_of = cache(lambda name: CASES[name]())
@@ -48,6 +47,8 @@ class Fault:
     new: str
     metric: Callable[[PhysicsCase, FloatArray], float]
     limit: float
+    method: str = "caustic_map"
+    also: tuple[tuple[str, str], ...] = ()
 
 
 def rmse(case: PhysicsCase, image: FloatArray) -> float:
@@ -81,30 +82,44 @@ FAULTS = [
         0.005,
     ),
     Fault(
+        "area by product of lengths",
+        "sphere",
+        "a.x * b.y - a.y * b.x, float(links)",
+        "length(a) * length(b), float(links)",
+        rmse,
+        0.01,
+        "displaced_mesh",
+        # The triangle's area too, or the splats that make up for what the triangles do not hold would hide the fault.
+        (("0.5 * cross2(b.xy - a.xy, c.xy - a.xy)", "0.5 * length(b.xy - a.xy) * length(c.xy - a.xy)"),),
+    ),
+    Fault(
         "map shifted by a texel", "sine", "vec2 at = projected.xy - 0.5;", "vec2 at = projected.xy + 0.5;", rmse, 0.01
     ),
 ]
 
 
-def seeded(target: Path, old: str, new: str) -> Path:
-    """A copy of glsl/ with the fault in it.
+def seeded(target: Path, *changes: tuple[str, str]) -> Path:
+    """A copy of glsl/ with the fault in it: (old, new) texts.
 
     Raises:
         AssertionError: the text is not there exactly once: the shader was changed, and the fault must follow it.
     """
     shutil.copytree(glsl_root(), target)
-    files = [path for path in target.rglob("*.*") if path.is_file() and old in path.read_text()]
-    assert len(files) == 1 and files[0].read_text().count(old) == 1, f"{old!r} is in {files}"
-    files[0].write_text(files[0].read_text().replace(old, new))
+    for old, new in changes:
+        files = [path for path in target.rglob("*.*") if path.is_file() and old in path.read_text()]
+        assert len(files) == 1 and files[0].read_text().count(old) == 1, f"{old!r} is in {files}"
+        files[0].write_text(files[0].read_text().replace(old, new))
     return target
 
 
-def render(case: PhysicsCase, shaders: Path | None = None, *, aov: str = "caustic_irradiance") -> FloatArray:
+def render(
+    case: PhysicsCase, shaders: Path | None = None, *, aov: str = "caustic_irradiance", method: str = "caustic_map"
+) -> FloatArray:
     """(128, 128, 3) of a case, seen from straight above; `image`: through the water, else of the floor behind it."""
     with glc.Renderer(
         case.scene,
         size=(SIZE, SIZE),
-        method=METHOD,
+        method=method,
         quality="medium",
         backend=BACKEND,
         aovs=(aov,) if aov != "image" else (),
@@ -119,15 +134,16 @@ def render(case: PhysicsCase, shaders: Path | None = None, *, aov: str = "causti
 
 
 @cache
-def healthy(name: str) -> FloatArray:
-    return render(case_of(name))
+def healthy(name: str, method: str = "caustic_map") -> FloatArray:
+    return render(case_of(name), method=method)
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_metrics_see_a_fault_in_the_shaders(fault: Fault, tmp_path: Path) -> None:
     case = case_of(fault.case)
-    well = fault.metric(case, healthy(fault.case))
-    ill = fault.metric(case, render(case, seeded(tmp_path / "glsl", fault.old, fault.new)))
+    well = fault.metric(case, healthy(fault.case, fault.method))
+    shaders = seeded(tmp_path / "glsl", (fault.old, fault.new), *fault.also)
+    ill = fault.metric(case, render(case, shaders, method=fault.method))
     print(f"\n{fault.name}: healthy {well:.4f}, with the fault {ill:.4f}, limit {fault.limit}")
     assert well < fault.limit
     assert ill > fault.limit and ill > CLEARLY * well
@@ -165,7 +181,7 @@ def test_metrics_see_the_missing_radiance_scale(tmp_path: Path) -> None:
     middle = np.zeros((BINS, BINS), bool)
     middle[BINS // 2 - 8 : BINS // 2 + 8, BINS // 2 - 8 : BINS // 2 + 8] = True
     truth = np.full((BINS, BINS, 3), passes**2 * 0.5 / (np.pi * WATER_IOR**2))
-    root = seeded(tmp_path / "glsl", "tint /= eta * eta;", "")
+    root = seeded(tmp_path / "glsl", ("tint /= eta * eta;", ""))
     well = abs(metrics.bias_of_mean(truth, render(case, aov="image"), mask=middle))
     ill = abs(metrics.bias_of_mean(truth, render(case, root, aov="image"), mask=middle))
     print(f"\nno 1/n^2: healthy {well:.4f}, with the fault {ill:.4f}")
