@@ -13,7 +13,18 @@ import glcaustics
 from glcaustics.bench.store import digest
 from glcaustics.gpu import glsl_root
 
-PACKAGES = ("glcaustics", "numpy", "moderngl", "mitsuba", "drjit", "embreex", "flip-evaluator", "pyoidn", "matplotlib")
+PACKAGES = (
+    "glcaustics",
+    "numpy",
+    "moderngl",
+    "mitsuba",
+    "drjit",
+    "embreex",
+    "flip-evaluator",
+    "pyoidn",
+    "pyluxcore",
+    "matplotlib",
+)
 
 
 def versions() -> dict[str, str | None]:

@@ -139,7 +139,7 @@ def _shown(row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> bool:
 
 
 def _step(row: Mapping[str, Any]) -> str:
-    return str(row["quality"]) if row["tool"] == "glcaustics" else f"{row['photons']} photons"
+    return f"{row['photons']} photons" if "photons" in row else str(row["quality"])
 
 
 def _errors(row: Mapping[str, Any]) -> str:

@@ -14,6 +14,8 @@ import numpy.typing as npt
 
 import glcaustics
 from glcaustics.bench.analysis import fit_power, pareto
+from glcaustics.bench.luxcore_peer import SCENES as LUXCORE_SCENES
+from glcaustics.bench.luxcore_peer import has_luxcore, luxcore_rows
 from glcaustics.bench.machine import code_key, commit, machine, versions
 from glcaustics.bench.measure import Case, Timing, errors, measure, picture, reduced, regular
 from glcaustics.bench.mitsuba_truth import Halves, mitsuba_reference
@@ -34,7 +36,7 @@ FloatArray = npt.NDArray[np.float64]
 @dataclass(frozen=True)
 class Plan:
     """What is measured. `sizes`: pixels a side, each a divisor of the largest; `photons`: of the peers;
-    `validate`: photons of each Mitsuba half that the beams are held against, 0 = not."""
+    `validate`: photons of each Mitsuba half that the beams are held against, 0 = not; `seconds`: given to LuxCore."""
 
     scenes: tuple[str, ...]
     methods: tuple[str, ...]
@@ -47,6 +49,7 @@ class Plan:
     timing: Timing = field(default_factory=Timing)
     backend: str = "auto"
     quick: bool = False
+    seconds: tuple[float, ...] = (1.0, 4.0, 16.0)
 
     @property
     def largest(self) -> int:
@@ -73,6 +76,7 @@ QUICK = replace(
     cells=320,
     timing=Timing(3, 30, 0.5),
     quick=True,
+    seconds=(1.0, 4.0),
 )
 
 
@@ -119,6 +123,7 @@ class Study:
             self._picture(scene)
             if self.peers:
                 self._peers(scene, target, truth)
+                self._luxcore(scene, target, truth)
         scaling = self._scaling()
         self._progress.close()
         return self._report(references, validation, scaling, time.perf_counter() - begin)
@@ -127,7 +132,8 @@ class Study:
         p = self.plan
         ours = (len(p.methods) + 1) * len(p.qualities) * len(p.sizes)
         each = 2 + bool(p.validate) + ours + (len(p.photons) if self.peers else 0)
-        return each * len(p.scenes) + (len(list(self._scaling_cases())) if p.scaling_scene else 0)
+        each_luxcore = sum(self._with_luxcore(name) for name in p.scenes)
+        return each * len(p.scenes) + each_luxcore + (len(list(self._scaling_cases())) if p.scaling_scene else 0)
 
     # ------------------------------------------------------------ cells
 
@@ -228,6 +234,28 @@ class Study:
             for method, row in rows.items():
                 self.rows.append(row | {"errors": errors(small, arrays[method])})
                 self.images[f"{scene.name} {method} {photons}"] = arrays[method]
+
+    def _with_luxcore(self, name: str) -> bool:
+        return self.peers and name in LUXCORE_SCENES and bool(self.plan.seconds) and has_luxcore()
+
+    def _luxcore(self, scene: Scene, target: Target, truth: Halves) -> None:
+        if not self._with_luxcore(scene.name):
+            if scene.name in LUXCORE_SCENES and not has_luxcore():
+                self.notes.append("pyluxcore is not installed (extra luxcore): LuxCore's LIGHTCPU is left out")
+            return
+        size, seconds = self.plan.largest, self.plan.seconds
+        key = digest("luxcore", 1, self._code, versions(), scene_key(scene), size, seconds)
+
+        def make() -> tuple[dict[str, Any], Arrays]:
+            rows, images = luxcore_rows(scene, target, size, seconds)
+            qualities = [row["quality"] for row in rows]
+            return dict(zip(qualities, rows, strict=True)), dict(zip(qualities, images, strict=True))
+
+        rows, arrays = self._cell(f"{scene.name}: LuxCore", key, make)
+        small = reduced(truth, size)
+        for quality, row in rows.items():
+            self.rows.append(row | {"errors": errors(small, arrays[quality])})
+            self.images[f"{scene.name} LIGHTCPU {quality}"] = arrays[quality]
 
     # ------------------------------------------------------------ scaling
 
