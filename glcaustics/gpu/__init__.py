@@ -7,9 +7,8 @@ Example:
 """
 
 from glcaustics.gpu.device import Device
-from glcaustics.gpu.doctor import doctor_report
 from glcaustics.gpu.open_device import create_device
 from glcaustics.gpu.program import Program
 from glcaustics.gpu.shader_source import ShaderLoader, glsl_root
 
-__all__ = ["Device", "Program", "ShaderLoader", "create_device", "doctor_report", "glsl_root"]
+__all__ = ["Device", "Program", "ShaderLoader", "create_device", "glsl_root"]

@@ -6,7 +6,7 @@ import ctypes.util
 from typing import Any
 
 from glcaustics.errors import DeviceError
-from glcaustics.gpu.backends import APT_REMEDY, AUTO_ORDER, osmesa_library
+from glcaustics.gpu.backends import APT_REMEDY, osmesa_library
 from glcaustics.gpu.device import Device
 from glcaustics.gpu.open_device import create_device
 
@@ -63,32 +63,3 @@ def adds_in_float(device: Device) -> bool:
     for thing in (array, program, framebuffer, texture):
         thing.release()
     return bool((values == 2.25).all())
-
-
-def doctor_report(backend: str = "auto") -> tuple[str, dict[str, Any]]:
-    """The report as text and as a JSON-able dict; "auto" looks at every backend.
-
-    Two Mesa front ends in one process can disturb each other: a caller that wants all of them and must not crash
-    runs one process a backend, as `glcaustics doctor` does.
-    """
-    names = AUTO_ORDER if backend == "auto" else (backend,)
-    report: dict[str, Any] = {
-        "libraries": system_libraries(),
-        "backends": {name: probe_backend(name) for name in names},
-    }
-    return _text(report), report
-
-
-def _text(report: dict[str, Any]) -> str:
-    lines = []
-    for name, library in report["libraries"].items():
-        lines.append(f"{name:<10} {library['found'] or 'missing: ' + library['remedy']}")
-    for name, found in report["backends"].items():
-        if not found["works"]:
-            lines += [f"backend {name}: does not work", f"  {found['error']}"]
-            continue
-        lines.append(f"backend {name}: works, {'software' if found['software'] else 'hardware'}")
-        lines.append(f"  additive blending in 32-bit float: {'yes' if found['float_blend_measured'] else 'NO'}")
-        lines += [f"  {key:<30} {value}" for key, value in found["info"].items() if key != "features"]
-        lines += [f"  {key:<30} {'yes' if there else 'no'}" for key, there in found["info"]["features"].items()]
-    return "\n".join(lines)
