@@ -26,7 +26,7 @@ class DisplacedMesh(LightMapMethod):
 
     name = "displaced_mesh"
     summary = "a mesh over water, glass and mirrors as the light sees them, drawn where its light lands"
-    paper = "Mayer, Assarsson, Sintorn 2026: Newton screen-space refraction and displaced caustic meshes"
+    paper = "Mayer, Assarsson, Sintorn 2026: Ultrafast Screen-Space Refractions and Caustics via Newton's Method"
     ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         quality: {
             "caster_size": caster, "map_size": map_size, "max_iterations": iterations, "march_steps": steps,

@@ -50,7 +50,7 @@ class PhotonTrace(CausticsMethod):
     summary = (
         "photons marched through the light's view, then the camera's: reflective caustics that the light does not see"
     )
-    paper = "Meenrattanakorn, Lambers 2022: Cascaded Image-Space Photon Tracing for Real-Time Caustics"
+    paper = "Meenrattanakorn, Lambers 2022: Real-Time Caustics Using Cascaded Image-Space Photon Tracing"
     noisy = True
     noise_share = 0.4
     unbiased_options: ClassVar[Mapping[str, Any]] = {"denoise": False}
