@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from glcaustics.passes import depth_chain, gbuffer, lighting, refraction, rsm, s
 from glcaustics.passes.frame import CameraState, FrameSetup, FrameState
 from glcaustics.passes.geometry import GpuScene
 from glcaustics.passes.runner import PlanRunner
-from glcaustics.scene.model import LightKind, OpticalKind, Scene
+from glcaustics.scene.model import Camera, LightKind, OpticalKind, Scene
 
 AOVS: dict[str, str] = {
     "image": "linear radiance of the picture, cd/m^2 or W/(m^2 sr)",
@@ -321,6 +321,23 @@ class Renderer:
     def options(self) -> dict[str, Any]:
         """The options in force."""
         return dict(self._setup.options)
+
+    def tune(self, *, camera: Camera | None = None, **counts: int) -> None:
+        """Another camera, and other counts that shaders take as they come (iterations, steps), from the next frame on.
+
+        For instruments that compare counts without building everything anew. Counts that size a texture or choose a
+        shader do not belong here; 0 iterations are allowed: the solvers' start.
+
+        Raises:
+            UsageError: not an option in force, or a negative count.
+        """
+        for name, count in counts.items():
+            if name not in self._setup.options or isinstance(count, bool) or count < 0:
+                remedy = f"give a count from 0 for one of: {', '.join(sorted(self._setup.options))}"
+                raise UsageError(f"option {name} cannot be tuned to {count!r}", where="tune", remedy=remedy)
+        self._setup.options = {**self._setup.options, **counts}
+        if camera is not None:
+            self.scene = replace(self.scene, camera=camera, camera_at=None)
 
     # -- frames -------------------------------------------------------------------------------------------------------
 

@@ -3,37 +3,60 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import json
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from glcaustics.bench.convergence import ITERATIONS, pooled
 from glcaustics.errors import UsageError
 from glcaustics.renderer import Renderer
 from glcaustics.scene.load import load_scene
 from glcaustics.scene.model import Camera, FloatArray, Scene
 
 SOLVED_BY_NEWTON, SOLVED_BY_MARCHING = 1, 5  # of `solve_status`
+SCENES = ("pool", "glass-statue", "boat", "lagoon")
 _AOVS = ("solve_status", "solve_hit")
+_STEPS = {"refraction_steps": 16384, "reflection_steps": 1}  # refracted rays are judged; reflections only cost
+
+# The published code on its own pool, measured for shared/peers.md: 1280x720, views A (31 % water) and B (99 % water).
+PUBLISHED: dict[str, dict[str, Any]] = {
+    "published, view A": {"iterations": (1, 2, 3, 4, 7), "within_1px": (0.62, 0.89, 0.941, 0.942, 0.945), "dda": 0.987},
+    "published, view B": {
+        "iterations": (1, 2, 3, 4, 7),
+        "within_1px": (0.76, 0.992, 0.998, 0.998, 0.998),
+        "dda": 0.998,
+    },
+}
 
 
 @dataclass(frozen=True)
 class EyeConvergence:
-    """Shares of the resolvable pixels of one view; resolvable = pixel-exact marching finds a surface.
+    """Shares of the resolvable pixels of one view; resolvable = pixel-exact marching (DDA) finds a surface.
 
-    `pixels`: specular pixels; `resolvable`: of them, the share. `within_1px[k]`: Newton's estimate after k iterations
-    lies within one pixel (max norm) of the marched hit. `reported[k]`: and Newton itself says that it is solved.
-    `wrong[k]`: says so, but is more than one pixel off. `cascade`, `hierarchical`: solved within 1 px by these.
+    `pixels`: specular pixels; `resolvable`: of them, the share; `iterations`: texel look-ups, 0 = the start alone.
+    `within_1px[k]`: Newton's estimate after `iterations[k]` lies within one pixel (max norm) of the marched hit.
+    `reported[k]`: and Newton itself says that it is solved. `wrong[k]`: says so, but is more than one pixel off.
+    `cascade`, `hierarchical`: solved within 1 px by these.
     """
 
     pixels: int
     resolvable: float
+    iterations: tuple[int, ...]
     within_1px: tuple[float, ...]
     reported: tuple[float, ...]
     wrong: tuple[float, ...]
     cascade: float
     hierarchical: float
+
+    @property
+    def weight(self) -> float:
+        """Number of resolvable pixels: what pooled shares are weighed by."""
+        return self.pixels * self.resolvable
 
 
 def seeded_cameras(scene: Scene, count: int, seed: int = 0) -> list[Camera]:
@@ -65,86 +88,158 @@ def look_at(eye: FloatArray, target: FloatArray) -> FloatArray:
     return m
 
 
+Solved = tuple[FloatArray, FloatArray]  # status (H, W), hit in pixels (H, W, 2)
+
+
+@contextmanager
+def _solver(scene: Scene, size: tuple[int, int], name: str, **renderer: Any) -> Iterator[Callable[..., Solved]]:
+    """One renderer for all views and counts of a solver: solve(camera, iterations)."""
+    options = {"refraction": name, **_STEPS}
+    with Renderer(scene, size, "none", aovs=_AOVS, stats=False, options=options, **renderer) as made:
+
+        def solve(camera: Camera, iterations: int = 4) -> Solved:
+            made.tune(camera=camera, refraction_iterations=iterations)
+            frame = made.render()
+            return frame.aov["solve_status"], frame.aov["solve_hit"][..., :2] * np.asarray(size, np.float32)
+
+        yield solve
+
+
 def eye_convergence(
     scene: Scene,
-    camera: Camera,
+    cameras: Sequence[Camera],
     size: tuple[int, int] = (1280, 720),
-    iterations: Sequence[int] = range(1, 9),
+    iterations: Sequence[int] = ITERATIONS,
     **renderer: Any,
-) -> EyeConvergence:
-    """Render one view with every solver and compare. `renderer`: further arguments of `Renderer`, such as `backend`."""
-    still = replace(scene, camera=camera, camera_at=None)
+) -> list[EyeConvergence]:
+    """Render every view with every solver and compare; one result a view that shows refraction.
 
-    def solve(solver: str, k: int = 4) -> tuple[FloatArray, FloatArray]:
-        options = {"refraction": solver, "refraction_iterations": k, "refraction_steps": 16384}
-        with Renderer(still, size, "none", aovs=_AOVS, options=options, **renderer) as made:
-            frame = made.render()
-        return frame.aov["solve_status"], frame.aov["solve_hit"][..., :2] * np.asarray(size, np.float32)
+    `renderer`: further arguments of `Renderer`, such as `backend`.
 
-    status, hit = solve("dda")
-    specular, resolvable = status > 0, status == SOLVED_BY_MARCHING
-    if not resolvable.any():
-        raise UsageError(f"scene '{scene.name}' shows no refraction from this camera", where="eye_convergence")
+    Raises:
+        UsageError: no view shows any refraction.
+    """
+    truths: list[tuple[Camera, int, FloatArray, FloatArray]] = []  # specular pixels, resolvable (H, W), hit
+    with _solver(scene, size, "dda", **renderer) as solve:
+        for camera in cameras:
+            status, hit = solve(camera)
+            resolvable = status == SOLVED_BY_MARCHING
+            if resolvable.any():
+                truths.append((camera, int((status > 0).sum()), resolvable, hit[resolvable]))
+    if not truths:
+        raise UsageError(f"scene '{scene.name}' shows no refraction from these cameras", where="eye_convergence")
+    shares: list[dict[str, Any]] = [{"within_1px": (), "reported": (), "wrong": ()} for _ in truths]
+    with _solver(scene, size, "newton", **renderer) as solve:
+        for (camera, _, resolvable, hit), found in zip(truths, shares, strict=True):
+            for count in iterations:
+                says, px = solve(camera, count)
+                near, solved = _near(px[resolvable], hit), says[resolvable] == SOLVED_BY_NEWTON
+                found["within_1px"] += (float(near.mean()),)
+                found["reported"] += (float((near & solved).mean()),)
+                found["wrong"] += (float((solved & ~near).mean()),)
+    for name in ("cascade", "hierarchical"):
+        with _solver(scene, size, name, **renderer) as solve:
+            for (camera, _, resolvable, hit), found in zip(truths, shares, strict=True):
+                says, px = solve(camera)
+                solved = np.isin(says[resolvable], (SOLVED_BY_NEWTON, SOLVED_BY_MARCHING))
+                found[name] = float((_near(px[resolvable], hit) & solved).mean())
+    return [
+        EyeConvergence(pixels, float(resolvable.sum()) / pixels, tuple(iterations), **found)
+        for (_, pixels, resolvable, _), found in zip(truths, shares, strict=True)
+    ]
 
-    def near(px: FloatArray) -> FloatArray:
-        return np.abs(px - hit).max(axis=-1)[resolvable] <= 1.0
 
-    within, reported, wrong = [], [], []
-    for k in iterations:
-        says, px = solve("newton", k)
-        solved = (says == SOLVED_BY_NEWTON)[resolvable]
-        within.append(float(near(px).mean()))
-        reported.append(float((near(px) & solved).mean()))
-        wrong.append(float((solved & np.logical_not(near(px))).mean()))
-    others = []
-    for solver in ("cascade", "hierarchical"):
-        says, px = solve(solver)
-        others.append(float((near(px) & np.isin(says, (SOLVED_BY_NEWTON, SOLVED_BY_MARCHING))[resolvable]).mean()))
-    return EyeConvergence(
-        int(specular.sum()),
-        float(resolvable.sum() / max(specular.sum(), 1)),
-        tuple(within),
-        tuple(reported),
-        tuple(wrong),
-        *others,
-    )
+def _near(px: FloatArray, hit: FloatArray) -> Any:
+    return np.abs(px - hit).max(axis=-1) <= 1.0
 
 
-def _print_view(index: int, found: EyeConvergence) -> None:
-    print(f"view {index}: {found.pixels} specular pixels, {found.resolvable:.3f} of them resolvable")
+def eye_study(
+    scenes: Sequence[str] = SCENES,
+    views: int = 6,
+    size: tuple[int, int] = (1280, 720),
+    iterations: Sequence[int] = ITERATIONS,
+    seed: int = 0,
+    report: Callable[[str], None] = lambda _: None,
+    **renderer: Any,
+) -> dict[str, Any]:
+    """The instrument of the bench, ready for JSON.
+
+    Args:
+        scenes: names or paths for `load_scene`. views: cameras a scene, see `seeded_cameras`.
+        report: told the name of each scene as its turn comes.
+
+    Returns:
+        `size`, `views`, `seed`, `iterations`, `seconds`, `published` (see PUBLISHED) and `scenes`: for each `scene`,
+        `seconds`, `pooled` (shares over the resolvable pixels of all views) and `views` (EyeConvergence each).
+    """
+    begin, rows = time.perf_counter(), []
+    for name in scenes:
+        report(f"{name}: eye rays")
+        start, scene = time.perf_counter(), load_scene(name)
+        found = eye_convergence(scene, seeded_cameras(scene, views, seed), size, iterations, **renderer)
+        each = [asdict(view) for view in found]
+        together = pooled(each, [view.weight for view in found])
+        together["resolvable"] = sum(view.weight for view in found) / together["pixels"]
+        rows.append({"scene": scene.name, "seconds": time.perf_counter() - start, "pooled": together, "views": each})
+    return {
+        "size": list(size),
+        "views": views,
+        "seed": seed,
+        "iterations": list(iterations),
+        "seconds": time.perf_counter() - begin,
+        "published": PUBLISHED,
+        "scenes": rows,
+    }
+
+
+def _print_row(label: str, row: dict[str, Any]) -> None:
+    print(f"{label}: {row['pixels']:.0f} specular pixels, {row['resolvable']:.3f} of them resolvable")
     for name in ("within_1px", "reported", "wrong"):
-        print(f"  {name:12s}" + " ".join(f"{share:.4f}" for share in getattr(found, name)))
-    print(f"  cascade {found.cascade:.4f}  hierarchical {found.hierarchical:.4f}")
+        print(f"  {name:12s}" + " ".join(f"{share:.4f}" for share in row[name]))
+    print(f"  cascade {row['cascade']:.4f}  hierarchical {row['hierarchical']:.4f}")
+
+
+def _print_costs(scene: Scene, camera: Camera, size: tuple[int, int], rounds: int, backend: str) -> None:
+    from glcaustics.bench.eye_cost import eye_cost
+
+    for reflections in (True, False):
+        costs = eye_cost(scene, camera, size, rounds=rounds, reflections=reflections, backend=backend)
+        print(f"cost in fetch passes, {'with' if reflections else 'without'} reflections")
+        for solver, parts in costs.items():
+            stages = "  ".join(f"{name} {cost:.2f}" for name, cost in parts.items() if name != "total")
+            ratio = parts["total"] / costs["dda"]["total"]
+            print(f"  {solver:12s} {parts['total']:6.2f}  {ratio:.2f} of dda   {stages}", flush=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """`python -m glcaustics.bench.eye_rays SCENE`: convergence and cost over seeded views, grazing ones among them."""
-    from glcaustics.bench.eye_cost import eye_cost
-
+    """`python -m glcaustics.bench.eye_rays [SCENE ...]`: convergence and cost over seeded views, some grazing."""
     parser = argparse.ArgumentParser(prog="python -m glcaustics.bench.eye_rays", description=main.__doc__)
-    parser.add_argument("scene")
+    parser.add_argument("scenes", nargs="*", default=list(SCENES))
     parser.add_argument("--views", type=int, default=6)
     parser.add_argument("--size", default="1280x720")
     parser.add_argument("--backend", default="auto")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rounds", type=int, default=5, help="frames a cost is the median of; 0: no costs")
     parser.add_argument("--cost-only", action="store_true")
+    parser.add_argument("--json", help="write what was found to this file")
     chosen = parser.parse_args(arguments)
     width, height = map(int, chosen.size.split("x"))
-    scene = load_scene(chosen.scene)
-    for index, camera in enumerate(seeded_cameras(scene, chosen.views, chosen.seed)):
-        if not chosen.cost_only:
-            counts = range(1, 9)
-            _print_view(index, eye_convergence(scene, camera, (width, height), counts, backend=chosen.backend))
-        for reflections in (True, False) if chosen.rounds else ():
-            costs = eye_cost(
-                scene, camera, (width, height), rounds=chosen.rounds, reflections=reflections, backend=chosen.backend
-            )
-            print(f"view {index}: cost in fetch passes, {'with' if reflections else 'without'} reflections")
-            for solver, parts in costs.items():
-                stages = "  ".join(f"{name} {cost:.2f}" for name, cost in parts.items() if name != "total")
-                ratio = parts["total"] / costs["dda"]["total"]
-                print(f"  {solver:12s} {parts['total']:6.2f}  {ratio:.2f} of dda   {stages}", flush=True)
+    if not chosen.cost_only:
+        found = eye_study(
+            chosen.scenes, chosen.views, (width, height), seed=chosen.seed, report=print, backend=chosen.backend
+        )
+        for row in found["scenes"]:
+            for index, view in enumerate(row["views"]):
+                _print_row(f"{row['scene']}, view {index}", view)
+            _print_row(f"{row['scene']}, pooled ({row['seconds']:.0f} s)", row["pooled"])
+        if chosen.json:
+            with open(chosen.json, "w", encoding="utf-8") as file:
+                json.dump(found, file, indent=1)
+    for name in chosen.scenes if chosen.rounds else ():
+        scene = load_scene(name)
+        for index, camera in enumerate(seeded_cameras(scene, chosen.views, chosen.seed)):
+            print(f"{scene.name}, view {index}")
+            _print_costs(scene, camera, (width, height), chosen.rounds, chosen.backend)
 
 
 if __name__ == "__main__":

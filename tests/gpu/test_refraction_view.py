@@ -72,8 +72,7 @@ def test_planes_are_written_only_where_they_are_read() -> None:
 def test_shares_of_solved_pixels_in_the_pool() -> None:
     """Issue 4's marks on seeded views: 99 % within 3 iterations, cascade 99.5 % of what pixel-exact marching solves."""
     scene = glc.load_scene("pool")
-    for camera in seeded_cameras(scene, 3):
-        found = eye_convergence(scene, camera, (480, 270), (1, 2, 3, 4), backend=BACKEND)
+    for found in eye_convergence(scene, seeded_cameras(scene, 3), (480, 270), (1, 2, 3, 4), backend=BACKEND):
         assert found.pixels > 5000 and found.resolvable > 0.4
         assert found.within_1px[2] >= 0.99
         assert found.within_1px[0] < found.within_1px[1] < found.within_1px[2]
