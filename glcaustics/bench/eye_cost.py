@@ -26,7 +26,8 @@ def eye_cost(
     """Median cost of every solver's passes, by solver: `total` and the parts of it.
 
     Unit: one full-screen rgba32f fetch into rgba32f at the same size (`texelFetch` of the own pixel). The solvers take
-    turns, so that a busy moment hits them alike. `reflections` False: their marches end after one step.
+    turns, so that a busy moment hits them alike, and a software renderer's time is the process's, all threads, so that
+    other processes hardly enter. `reflections` False: their marches end after one step.
     `renderer`: further arguments of `Renderer`, such as `backend`.
     """
     still = replace(scene, camera=camera, camera_at=None)
@@ -40,6 +41,8 @@ def eye_cost(
             )
             for solver in solvers
         }
+        for each in made.values():
+            each.device.count_processor_time()
         for index in range(rounds + 1):  # the first one compiles and uploads
             for solver, each in made.items():
                 each.device.make_current()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -238,6 +239,10 @@ class Device(Resources):
     def timer_kind(self) -> str:
         """ "GPU query", or "wall clock" (around finish) on a software renderer."""
         return self._timers.kind
+
+    def count_processor_time(self) -> None:
+        """On a software renderer the timers count the process's time, all threads, from now on: for a busy machine."""
+        self._timers.clock = time.process_time
 
     @property
     def timings(self) -> dict[str, float]:
