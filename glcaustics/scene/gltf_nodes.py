@@ -10,7 +10,7 @@ import numpy as np
 
 from glcaustics.scene.gltf_file import GltfFile
 from glcaustics.scene.gltf_json import Json
-from glcaustics.scene.limits import MAX_COORDINATE_M
+from glcaustics.scene.limits import MAX_ANGULAR_DIAMETER_DEG, MAX_COORDINATE_M
 from glcaustics.scene.model import Camera, FloatArray, Light, LightKind
 
 AGAIN = "export the file again"
@@ -116,7 +116,28 @@ def read_light(file: GltfFile, node: PlacedNode) -> Light | None:
     inner, outer = _cone(file, item) if kind == "spot" else (0.0, math.pi / 4)
     name = item.name if item.value.get("name") else node.item.name
     rgb = (color[0], color[1], color[2])
-    return Light(LightKind(kind), name, rgb, intensity, (px, py, pz), (x, y, z), inner, outer)
+    size = _size(file, item, node.item, kind)
+    return Light(LightKind(kind), name, rgb, intensity, (px, py, pz), (x, y, z), inner, outer, **size)
+
+
+def _size(file: GltfFile, item: Json, node: Json, kind: str) -> dict[str, float]:
+    """A light's size from `extras` of the light, else of its node: KHR_lights_punctual has none, and Blender does not
+    write its lights' radius and angle, but it writes custom properties as extras.
+    """
+    key, other = ("angular_diameter_deg", "radius_m") if kind == "directional" else ("radius_m", "angular_diameter_deg")
+    value = None
+    for owner in (item, node):
+        extras = owner.value.get("extras")
+        if not isinstance(extras, dict):  # any JSON is allowed there
+            continue
+        if value is None and key in extras:
+            high = MAX_ANGULAR_DIAMETER_DEG if kind == "directional" else MAX_COORDINATE_M
+            value = Json(extras, f"{owner.path}.extras", owner.where).number(key, 0.0, 0.0, high)
+        if owner is item and other in extras:
+            file.announce(f"light '{item.name}': its {other} is left out, as a {kind} light has {key}")
+    if not value:
+        return {}
+    return {"angular_diameter_rad": math.radians(value)} if kind == "directional" else {"radius_m": value}
 
 
 def _cone(file: GltfFile, item: Json) -> tuple[float, float]:

@@ -10,6 +10,7 @@ MAX_MESH_VERTICES = 16_000_000  # one mesh: 32 bytes a vertex, so half a gigabyt
 MAX_SCENE_VERTICES = 32_000_000  # the whole scene, instances counted
 MAX_SCENE_TRIANGLES = 64_000_000
 MAX_INSTANCES = 20_000  # one draw call each
+MAX_ANGULAR_DIAMETER_DEG = 90.0  # of a directional light
 MAX_LIGHTS = 64  # a shadow map each, six for a point light
 MAX_COORDINATE_M = 1e15  # float32 squares of lengths on the GPU stay finite
 MAX_IMAGE_SIDE = 16_384  # texels; what OpenGL drivers commonly take

@@ -132,10 +132,14 @@ class LightKind(Enum):
 
 @dataclass(frozen=True)
 class Light:
-    """KHR_lights_punctual. `intensity`: lux (directional: irradiance on a perpendicular plane) or candela.
+    """KHR_lights_punctual, and its size. `intensity`: lux (directional: irradiance on a perpendicular plane) or candela.
 
     `direction_ws`: unit vector the light travels along (unused by point lights). Cone angles are half angles, radians;
-    the fall-off between them is glTF's.
+    the fall-off between them is glTF's, about the light's centre.
+
+    Size, 0 = none: `radius_m` of a point or spot light makes it a sphere of even radiance intensity / (pi radius^2),
+    which has that intensity in every direction; `angular_diameter_rad` of a directional one makes it an even disc in
+    the sky of the same irradiance on a plane perpendicular to `direction_ws`.
     """
 
     kind: LightKind
@@ -146,6 +150,14 @@ class Light:
     direction_ws: tuple[float, float, float] = (0.0, -1.0, 0.0)
     inner_cone_rad: float = 0.0
     outer_cone_rad: float = math.pi / 4
+    radius_m: float = 0.0
+    angular_diameter_rad: float = 0.0
+
+    @property
+    def has_size(self) -> bool:
+        """Whether it is more than a point: its shadows and caustics are soft."""
+        is_directional = self.kind is LightKind.DIRECTIONAL
+        return (self.angular_diameter_rad if is_directional else self.radius_m) > 0.0
 
     @property
     def shines(self) -> bool:

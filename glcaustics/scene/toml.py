@@ -20,7 +20,7 @@ from glcaustics.errors import SceneError
 from glcaustics.scene.camera_path import CameraKey, camera_path
 from glcaustics.scene.defaults import complete
 from glcaustics.scene.gltf import GltfContents, read_gltf
-from glcaustics.scene.limits import check_image_size, check_limits
+from glcaustics.scene.limits import MAX_ANGULAR_DIAMETER_DEG, MAX_COORDINATE_M, check_image_size, check_limits
 from glcaustics.scene.model import Camera, Image, Instance, Light, LightKind, Material, Scene, Sky
 from glcaustics.scene.strict_table import StrictTable
 from glcaustics.scene.toml_objects import existing_file, read_object
@@ -184,6 +184,10 @@ def _read_light(table: StrictTable, default_name: str) -> Light:
     }
     if kind is not LightKind.DIRECTIONAL:
         values["position_ws"] = table.vector("position", 3)
+        values["radius_m"] = table.number("radius_m", 0.0, low=0.0, high=MAX_COORDINATE_M)
+    else:
+        degrees = table.number("angular_diameter_deg", 0.0, low=0.0, high=MAX_ANGULAR_DIAMETER_DEG)
+        values["angular_diameter_rad"] = math.radians(degrees)
     if kind is not LightKind.POINT:
         direction = np.array(table.vector("direction", 3))
         length = float(np.linalg.norm(direction))

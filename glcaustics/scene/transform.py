@@ -14,7 +14,7 @@ from glcaustics.scene.model import Camera, FloatArray, Instance, Light, LightKin
 def scaled(scene: Scene, factor: float) -> Scene:
     """The scene `factor` times as large about the world's origin, so lit that its picture stays the same.
 
-    Lengths (geometry, waters, lights, camera, absorption distances) grow by `factor`, the intensity of point and spot
+    Lengths (geometry, waters, lights and their radii, camera, absorption distances) grow by `factor`, the intensity of point and spot
     lights by its square, so that irradiance stays; directional lights, sky, emission and exposure are kept.
 
     Args:
@@ -66,4 +66,5 @@ def _scaled_camera(camera: Camera, factor: float) -> Camera:
 def _scaled_light(light: Light, factor: float) -> Light:
     x, y, z = light.position_ws
     intensity = light.intensity if light.kind is LightKind.DIRECTIONAL else light.intensity * factor * factor
-    return replace(light, position_ws=(x * factor, y * factor, z * factor), intensity=intensity)
+    moved = (x * factor, y * factor, z * factor)
+    return replace(light, position_ws=moved, intensity=intensity, radius_m=light.radius_m * factor)

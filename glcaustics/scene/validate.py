@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from glcaustics.errors import SceneError
-from glcaustics.scene.limits import MAX_COORDINATE_M
+from glcaustics.scene.limits import MAX_ANGULAR_DIAMETER_DEG, MAX_COORDINATE_M
 from glcaustics.scene.model import Camera, Image, Instance, Light, LightKind, Material, Mesh, Scene, WaterBody
 
 UNIT_TOLERANCE = 1e-3  # of the length of normals and directions
@@ -151,6 +151,10 @@ def _check_light(light: Light, where: str) -> None:
     owner = f"light '{light.name}'"
     _check(light.intensity, f"{owner}: intensity {light.intensity}", where, low=0.0)
     _check_color(light.color, f"{owner}: color", where)
+    _check(light.radius_m, f"{owner}: radius_m {light.radius_m}", where, low=0.0, high=MAX_COORDINATE_M)
+    degrees = math.degrees(light.angular_diameter_rad)
+    what = f"{owner}: angular_diameter_deg {degrees:g}"
+    _check(degrees, what, where, low=0.0, high=MAX_ANGULAR_DIAMETER_DEG)
     if light.kind is not LightKind.DIRECTIONAL and not np.isfinite(light.position_ws).all():
         raise SceneError(f"{owner}: its position is not finite", where=where, remedy="give finite numbers")
     if light.kind is not LightKind.POINT:

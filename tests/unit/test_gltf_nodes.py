@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from glcaustics.errors import SceneError
 from glcaustics.scene.gltf import load_gltf, read_gltf
 from glcaustics.scene.model import LightKind
 from tests.unit.glb_builder import build_glb, builder, cube, plane, torus
@@ -71,6 +72,30 @@ def test_point_directional_and_spot_lights(tmp_path: Path) -> None:
     assert np.allclose(spot.direction_ws, (0, 0, -1)) and spot.position_ws == (0.0, 4.0, 0.0)
     assert (spot.inner_cone_rad, spot.outer_cone_rad) == (0.1, 0.4)
     assert (plain.intensity, plain.inner_cone_rad, plain.outer_cone_rad) == (1.0, 0.0, math.pi / 4)
+
+
+def test_sizes_of_lights_come_from_extras_of_the_light_or_its_node(tmp_path: Path) -> None:
+    lights = [
+        {"type": "point", "extras": {"radius_m": 0.05}, "scale": [3, 3, 3]},
+        {"type": "directional", "extras": {"angular_diameter_deg": 0.53}},
+        {"type": "spot", "name": "odd", "spot": {}, "extras": {"angular_diameter_deg": 2, "note": "kept by nobody"}},
+        {"type": "point", "extras": "any JSON is allowed"},
+    ]
+    build = builder([torus()], lights=lights)
+    owner = next(n for n in build.root["nodes"] if n.get("extensions", {}).get("KHR_lights_punctual") == {"light": 3})
+    owner["extras"] = {"radius_m": 0.25}
+    scene = load_gltf(build.write(tmp_path / "a.glb"))
+    assert [light.radius_m for light in scene.lights] == [0.05, 0.0, 0.0, 0.25], "a scaled node does not scale it"
+    assert scene.lights[1].angular_diameter_rad == pytest.approx(math.radians(0.53))
+    assert [light.has_size for light in scene.lights] == [True, True, False, True]
+    said = "light 'odd': its angular_diameter_deg is left out, as a spot light has radius_m"
+    assert said in scene.announcements
+
+
+def test_a_wrong_size_is_one_line(tmp_path: Path) -> None:
+    lights = [{"type": "point", "extras": {"radius_m": -1.0}}]
+    with pytest.raises(SceneError, match=r"lights\[0\]\.extras: 'radius_m' is -1.0, not a finite number from 0"):
+        load_gltf(build_glb(tmp_path / "a.glb", [torus()], lights=lights))
 
 
 def test_dark_lights_and_ranges_are_announced(tmp_path: Path) -> None:

@@ -29,8 +29,8 @@ def example() -> Scene:
         "example",
         (Instance("a", TRIANGLE, glass, matrix), Instance("b", TRIANGLE, glass), Instance("c", TRIANGLE, Material())),
         (
-            Light(LightKind.DIRECTIONAL, intensity=5.0),
-            Light(LightKind.POINT, intensity=7.0, position_ws=(1.0, 2.0, 3.0)),
+            Light(LightKind.DIRECTIONAL, intensity=5.0, angular_diameter_rad=0.01),
+            Light(LightKind.POINT, intensity=7.0, position_ws=(1.0, 2.0, 3.0), radius_m=0.2),
             Light(LightKind.SPOT, intensity=9.0, position_ws=(0.0, 4.0, 0.0), outer_cone_rad=0.5),
         ),
         Camera.look_at((1, 2, 3), (0, 0, 0), orthographic=True, ymag_m=1.5),
@@ -52,6 +52,8 @@ def test_lengths_grow_and_irradiance_stays(factor: float) -> None:
     target = np.array([0.3, -0.2, 0.1])
     for old, new in zip(before.lights, after.lights, strict=True):
         assert np.allclose(new.position_ws, factor * np.array(old.position_ws))
+        assert new.radius_m == pytest.approx(factor * old.radius_m)
+        assert new.angular_diameter_rad == old.angular_diameter_rad
         if old.kind is LightKind.DIRECTIONAL:
             assert new.intensity == old.intensity
             continue

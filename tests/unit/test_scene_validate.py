@@ -51,6 +51,12 @@ BAD = {
     "attenuation": (scene(Material("g", attenuation_distance_m=0.0)), "attenuation_distance_m 0.0 is not above 0"),
     "dispersion": (scene(Material("g", ior=1.2, dispersion=60.0)), "dispersion 60 the ior of red"),
     "image": (scene(Material("g", base_color_image=Image("i", np.zeros((2, 2)), True))), "image 'i' has shape (2, 2)"),
+    "radius": (scene(light=spot(radius_m=-0.1)), "light 'lamp': radius_m -0.1 is below 0"),
+    "nan radius": (scene(light=spot(radius_m=math.nan)), "light 'lamp': radius_m nan is not finite"),
+    "disc": (
+        scene(light=Light(LightKind.DIRECTIONAL, angular_diameter_rad=2.0)),
+        "angular_diameter_deg 114.592 is above",
+    ),
     "positions": (scene(mesh=replace(MESH, positions_m=np.full((3, 3), np.nan))), "positions_m of vertex 0 is not"),
     "far": (scene(mesh=replace(MESH, positions_m=np.full((3, 3), 1e20))), "beyond 1e+15"),
     "normals": (scene(mesh=replace(MESH, normals=MESH.normals * 2)), "normal of vertex 0 has length 2"),

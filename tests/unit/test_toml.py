@@ -102,6 +102,7 @@ position = [1, 2, 3]
 color = [1, 0.5, 0.25]
 [[light]]
 kind = "spot"
+radius_m = 0.04
 intensity = 5
 position = [0, 4, 0]
 direction = [0, -1, 1]
@@ -141,6 +142,7 @@ uv_scale = [2, 3]
     assert bulb.position_ws == (1, 2, 3) and bulb.intensity == 800 and bulb.color == (1, 0.5, 0.25)
     assert spot.inner_cone_rad == pytest.approx(math.radians(10)) and spot.outer_cone_rad == pytest.approx(math.pi / 6)
     assert np.linalg.norm(spot.direction_ws) == pytest.approx(1.0)
+    assert spot.radius_m == 0.04 and spot.has_size and not bulb.has_size
     (box,) = scene.instances
     material = box.material
     assert material.base_color_image is not None and material.base_color_image.srgb
