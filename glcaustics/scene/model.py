@@ -132,7 +132,7 @@ class LightKind(Enum):
 
 @dataclass(frozen=True)
 class Light:
-    """KHR_lights_punctual, and its size. `intensity`: lux (directional: irradiance on a perpendicular plane) or candela.
+    """KHR_lights_punctual, and a size. `intensity`: lux (directional: irradiance on a perpendicular plane) or candela.
 
     `direction_ws`: unit vector the light travels along (unused by point lights). Cone angles are half angles, radians;
     the fall-off between them is glTF's, about the light's centre.

@@ -14,8 +14,9 @@ from glcaustics.scene.model import Camera, FloatArray, Instance, Light, LightKin
 def scaled(scene: Scene, factor: float) -> Scene:
     """The scene `factor` times as large about the world's origin, so lit that its picture stays the same.
 
-    Lengths (geometry, waters, lights and their radii, camera, absorption distances) grow by `factor`, the intensity of point and spot
-    lights by its square, so that irradiance stays; directional lights, sky, emission and exposure are kept.
+    Lengths (geometry, waters, lights and their radii, camera, absorption distances) grow by `factor`, the intensity of
+    point and spot lights by its square, so that irradiance stays; directional lights, sky, emission and exposure are
+    kept.
 
     Args:
         scene: any scene; it is not changed.
