@@ -1,4 +1,4 @@
-"""Irradiance by Mitsuba's `ptracer`: a pinhole over the receiver, E = pi L / albedo; and what an eye sees of it.
+"""Irradiance by Mitsuba's `ptracer`: a pinhole over the receiver, E = pi L / albedo.
 
 The receivers get a tiny albedo, so that light that bounces from them a second time does not count (the share is the
 albedo itself); the direct light is taken off by a render of depth 2 with the same seed.
@@ -8,19 +8,20 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from glcaustics.bench.mitsuba_scene import aimed_light, best_variant, camera_sensor, film, look, mitsuba, shapes
+from glcaustics.bench.mitsuba_scene import aimed_light, best_variant, film, look, mitsuba, shapes
 from glcaustics.bench.scene_export import beam_scene
 from glcaustics.bench.store import Store, digest, scene_key
 from glcaustics.bench.targets import Target, casters, luminance
 from glcaustics.errors import UsageError
 from glcaustics.optics.raycast import RayCaster
-from glcaustics.scene.model import Camera, LightKind, Scene
+from glcaustics.scene.model import LightKind, Scene
 
 FloatArray = npt.NDArray[np.float64]
 ALBEDO = 1e-3
@@ -53,35 +54,38 @@ class Halves:
         return np.sqrt(np.mean((0.5 * (self.first - self.second)) ** 2))
 
 
-class PhotonMap:
-    """A scene loaded once, whose irradiance at a target is then estimated with any number of photons.
+class Ptracer:
+    """A scene loaded once, whose irradiance at a sensor's pixels is then estimated with any number of photons.
 
     Args:
-        scene: see `targets.bench_scene`.
-        pixels: of each side of the image.
+        scene: as Mitsuba gets it. sensor: makes its camera. film: pixels (height, width). interfaces: light's most.
         variant: of Mitsuba; the fastest there is when None.
 
     Raises:
-        UsageError: Mitsuba is missing, or the target's pinhole does not see all of it.
+        UsageError: Mitsuba is missing.
     """
 
-    def __init__(self, scene: Scene, target: Target, pixels: int, variant: str | None = None) -> None:
-        check_pinhole(scene, target)
-        scene, target = enlarged(scene, target, HALF_M / target.half_m)
+    def __init__(
+        self,
+        scene: Scene,
+        sensor: Callable[[Any], dict[str, Any]],
+        film: tuple[int, int],
+        interfaces: int,
+        variant: str | None = None,
+    ) -> None:
         self.variant = variant or best_variant()
         self._mi = mi = mitsuba(self.variant)
+        self._film = film
         self._scenes = []
-        self._pixels, self._pinhole = pixels, Pinhole.over(target, pixels)
         aim = np.concatenate([i.positions_ws() for i in casters(scene)])
         everything = np.concatenate([i.positions_ws() for i in scene.instances_at(0.0)])
         for light in scene.lights:
             if not light.shines:
                 continue
             parts = shapes(mi, scene, light, albedo=ALBEDO)
-            parts |= {"type": "scene", "light": aimed_light(mi, light, aim, everything)}
-            parts["sensor"] = self._pinhole.sensor(mi)
+            parts |= {"type": "scene", "light": aimed_light(mi, light, aim, everything), "sensor": sensor(mi)}
             self._scenes.append(mi.load_dict(parts))
-        self._depth = target.interfaces + 2
+        self._depth = interfaces + 2
         self.seconds = 0.0  # spent on passes of the full depth since somebody set this to 0
 
     def render(self, photons: int, seed: int, *, direct: bool = False) -> FloatArray:
@@ -90,10 +94,10 @@ class PhotonMap:
         Args:
             direct: keep light that met no caster.
         """
-        film_pixels = self._pinhole.side**2
+        film_pixels = self._film[0] * self._film[1]
         spp, done = self.photons(photons) // film_pixels, 0
         each = max(SAMPLES_PER_PASS, PHOTONS_PER_PASS // film_pixels)
-        total = np.zeros((self._pixels, self._pixels))
+        total = np.zeros(self._film)
         while done < spp:
             count = min(each, spp - done)
             run = seed * SEED_STRIDE + done // each
@@ -104,12 +108,16 @@ class PhotonMap:
                 image = image - self._pass(2, count, run)
             total += image * count
             done += count
-        return total / spp
+        return self._wanted(total / spp)
 
     def photons(self, at_least: int) -> int:
         """The number that is really traced: a whole number for each pixel of the film."""
-        film_pixels = self._pinhole.side**2
+        film_pixels = self._film[0] * self._film[1]
         return film_pixels * max(1, -(-at_least // film_pixels))
+
+    def _wanted(self, image: FloatArray) -> FloatArray:
+        """The part of the film that was asked for."""
+        return image
 
     def _pass(self, depth: int, spp: int, seed: int) -> FloatArray:
         mi = self._mi
@@ -118,37 +126,61 @@ class PhotonMap:
         images = [np.array(mi.render(s, integrator=integrator, spp=spp, seed=seed % 2**32)) for s in self._scenes]
         radiance = np.sum(np.asarray(images, np.float64), axis=0)
         flat = radiance[..., 0] if radiance.shape[-1] == 1 else luminance(radiance)
-        hole = self._pinhole
-        flat = flat[hole.row : hole.row + self._pixels, hole.column : hole.column + self._pixels]
         return np.asarray(flat * (math.pi / ALBEDO))
+
+
+class PhotonMap(Ptracer):
+    """Irradiance (P, P) at a target.
+
+    Args:
+        scene: see `targets.bench_scene`. pixels: of each side of the image. variant: see Ptracer.
+
+    Raises:
+        UsageError: Mitsuba is missing, or the target's pinhole does not see all of it.
+    """
+
+    def __init__(self, scene: Scene, target: Target, pixels: int, variant: str | None = None) -> None:
+        check_pinhole(scene, target)
+        scene, target = enlarged(scene, target, HALF_M / target.half_m)
+        hole = self._hole = Pinhole.over(target, pixels)
+        self._pixels = pixels
+        super().__init__(scene, hole.sensor, (hole.side, hole.side), target.interfaces, variant)
+
+    def _wanted(self, image: FloatArray) -> FloatArray:
+        hole = self._hole
+        return image[hole.row : hole.row + self._pixels, hole.column : hole.column + self._pixels]
 
 
 def enlarged(scene: Scene, target: Target, factor: float) -> tuple[Scene, Target]:
     """The same at another scale, about the target's centre as the origin; irradiance stays what it is."""
+    larger, move = larger_scene(scene, factor, np.asarray(target.centre_ws, np.float64))
+    moved = replace(
+        target,
+        centre_ws=_moved(move, target.centre_ws),
+        half_m=factor * target.half_m,
+        pinhole_ws=_moved(move, target.pinhole_ws),
+    )
+    return larger, moved
+
+
+def larger_scene(scene: Scene, factor: float, centre_ws: FloatArray) -> tuple[Scene, FloatArray]:
+    """The scene at time 0 at another scale about a point that becomes the origin, and the map (4, 4) of its points."""
     move = np.eye(4)
     move[:3, :3] *= factor
-    move[:3, 3] = -factor * np.asarray(target.centre_ws)
+    move[:3, 3] = -factor * centre_ws
     instances = tuple(replace(i, world_from_object=move @ i.world_from_object) for i in scene.instances_at(0.0))
-
-    def moved(point: tuple[float, float, float]) -> tuple[float, float, float]:
-        x, y, z = (move @ [*point, 1.0])[:3].tolist()
-        return x, y, z
-
     lights = tuple(
         light
         if light.kind is LightKind.DIRECTIONAL
-        else replace(light, position_ws=moved(light.position_ws), intensity=light.intensity * factor**2)
+        else replace(light, position_ws=_moved(move, light.position_ws), intensity=light.intensity * factor**2)
         for light in scene.lights
     )
-    return (
-        replace(scene, instances=instances, waters=(), lights=lights),
-        replace(
-            target,
-            centre_ws=moved(target.centre_ws),
-            half_m=factor * target.half_m,
-            pinhole_ws=moved(target.pinhole_ws),
-        ),
-    )
+    return replace(scene, instances=instances, waters=(), lights=lights), move
+
+
+def _moved(move: FloatArray, point: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = (move @ [*point, 1.0])[:3].tolist()
+    return x, y, z
 
 
 @dataclass(frozen=True)
@@ -222,49 +254,3 @@ def mitsuba_reference(
     halves = Halves(first, second, time.perf_counter() - start, source)
     store.save(key, {"source": source}, {"first": first, "second": second})
     return halves
-
-
-def seen_radiance(
-    scene: Scene,
-    target: Target,
-    irradiance: FloatArray,
-    camera: Camera,
-    size: tuple[int, int],
-    *,
-    albedo: float,
-    spp: int,
-) -> FloatArray:
-    """Radiance (H, W) of the target's caustic as an eye sees it past water and glass: the second of two stages.
-
-    The irradiance map becomes the emission albedo / pi E of an area light on the receiver, which Mitsuba's `path`
-    follows through specular surfaces (light paths from a point or directional light through water to the eye,
-    "SDS", are beyond every integrator). Everything else is black.
-
-    Args:
-        irradiance: (P, P) at the target, row 0 at -z.
-    """
-    mi = mitsuba(best_variant())
-    light = scene.lights[0]
-    parts = shapes(mi, scene, light, albedo=0.0) | {"type": "scene", "sensor": camera_sensor(mi, camera, size)}
-    x, y, z = target.centre_ws
-    emission = np.ascontiguousarray((irradiance * (albedo / math.pi))[..., None], np.float32)
-    lift = 1e-4 * target.half_m
-    # `look` along +y with up -z: the rectangle's u is +x and its v is -z; a bitmap's last row is at v = 1
-    parts["caustic"] = {
-        "type": "rectangle",
-        "to_world": look(mi, (x, y + lift, z), (0, 1, 0), (0, 0, -1), (target.half_m, target.half_m, 1.0)),
-        "bsdf": {"type": "diffuse", "reflectance": 0.0},
-        "emitter": {
-            "type": "area",
-            "radiance": {
-                "type": "bitmap",
-                "bitmap": mi.Bitmap(np.ascontiguousarray(emission[::-1])),
-                "raw": True,
-                "filter_type": "nearest",
-                "wrap_mode": "clamp",
-            },
-        },
-    }
-    integrator = mi.load_dict({"type": "path", "max_depth": 8, "rr_depth": 1000})
-    image = np.array(mi.render(mi.load_dict(parts), integrator=integrator, spp=spp, seed=7), np.float64)
-    return np.asarray(image[..., 0] if image.shape[-1] == 1 else luminance(image))

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from glcaustics.bench.mitsuba_scene import SURE_VARIANT, best_variant
-from glcaustics.bench.mitsuba_truth import PhotonMap, Pinhole, enlarged, mitsuba_reference, seen_radiance
+from glcaustics.bench.mitsuba_seen import seen_radiance
+from glcaustics.bench.mitsuba_truth import PhotonMap, Pinhole, enlarged, mitsuba_reference
 from glcaustics.bench.references import beam_reference
 from glcaustics.bench.store import Store
 from glcaustics.bench.study import agreement
