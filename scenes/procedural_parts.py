@@ -139,6 +139,20 @@ def upward(part):
     return (positions, -normals, uv, triangles[:, ::-1]) if normals[:, 1].mean() < 0.0 else part
 
 
+def ground(height, x_m, z_m, columns, rows):
+    """The part over a rectangle at y = height(x, z), its texture stretched once over it. x_m, z_m: (low, high)."""
+    x, z = np.meshgrid(np.linspace(*x_m, columns), np.linspace(*z_m, rows))
+    uv = np.stack([(x - x_m[0]) / (x_m[1] - x_m[0]), (z - z_m[0]) / (z_m[1] - z_m[0])], axis=-1)
+    return upward(grid_part(np.stack([x, height(x, z), z], axis=-1), uv))
+
+
+def ground_texels(x_m, z_m, width):
+    """x and z (H, W), metres, of the texels of a texture `width` texels wide for `ground`."""
+    height = int(width * (z_m[1] - z_m[0]) / (x_m[1] - x_m[0]))
+    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    return x_m[0] + u * (x_m[1] - x_m[0]), z_m[0] + v * (z_m[1] - z_m[0])
+
+
 def ribbon(random, length, width, bend, lean, rows):
     """A blade from the origin upwards: (positions, normals, uv, triangles), bent over towards `lean` (radians)."""
     t = np.linspace(0.0, 1.0, rows)

@@ -127,19 +127,13 @@ def check_read(step: Step, resource: str) -> None:
             f"pass '{step.name}' reads the optional '{resource}', which no pass of this frame writes",
             remedy="ask `present_optional` first",
         )
-    raise GraphError(
-        f"pass '{step.name}' reads '{resource}', which it did not declare",
-        remedy=f"declared are: {', '.join((*step.decl.reads, *step.decl.optional)) or 'none'}",
-    )
+    raise _undeclared(step, "reads", resource, (*step.decl.reads, *step.decl.optional))
 
 
 def check_history(step: Step, resource: str) -> None:
     """Raise GraphError unless the pass declared that it reads the previous frame's resource."""
     if resource not in step.decl.history:
-        raise GraphError(
-            f"pass '{step.name}' reads the history of '{resource}', which it did not declare",
-            remedy=f"declared are: {', '.join(step.decl.history) or 'none'}",
-        )
+        raise _undeclared(step, "reads the history of", resource, step.decl.history)
 
 
 def check_write(step: Step, resource: str) -> None:
@@ -151,7 +145,11 @@ def check_write(step: Step, resource: str) -> None:
             f"pass '{step.name}' writes '{resource}', which nobody reads, so that it is not allocated",
             remedy="ask `live_writes` first, or list it in always_writes",
         )
-    raise GraphError(
-        f"pass '{step.name}' writes '{resource}', which it did not declare",
-        remedy=f"declared are: {', '.join(step.decl.writes) or 'none'}",
+    raise _undeclared(step, "writes", resource, tuple(step.decl.writes))
+
+
+def _undeclared(step: Step, does: str, resource: str, declared: tuple[str, ...]) -> GraphError:
+    return GraphError(
+        f"pass '{step.name}' {does} '{resource}', which it did not declare",
+        remedy=f"declared are: {', '.join(declared) or 'none'}",
     )

@@ -14,22 +14,10 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
+import procedural_parts as geo  # noqa: E402
 from hull import clinker_boat  # noqa: E402
 from procedural import save_jpg, save_png, write_glb  # noqa: E402
 from procedural_fields import fractal2, noise2, pebbles, periodic, scatter, step  # noqa: E402
-from procedural_parts import (  # noqa: E402
-    boulder,
-    grid_part,
-    joined,
-    matrix,
-    placed,
-    rotation_x,
-    rotation_y,
-    rotation_z,
-    tube,
-    tuft,
-    upward,
-)
 
 X_M, Z_M = (-6.8, 5.8), (-5.6, 3.9)  # the bed's rectangle
 BOAT_AT, BOAT_YAW, BOAT_PITCH, BOAT_ROLL = (0.15, -0.40, -0.75), 154.0, 12.0, 9.0
@@ -55,10 +43,10 @@ def lily_pads(seed, spots):
         rise = 0.014 + 0.03 * radius * np.linspace(0, 1, 5)[:, None] ** 4 + 0.004 * np.sin(3 * angle + n) * r / radius
         lattice = np.stack([x + r * np.cos(angle), rise, z + r * np.sin(angle)], axis=-1)
         u, v = np.meshgrid((angle - turn) / (2 * np.pi), np.linspace(0.0, 1.0, 5))
-        leaves.append(upward(grid_part(lattice, np.stack([u, v], axis=-1))))
+        leaves.append(geo.upward(geo.grid_part(lattice, np.stack([u, v], axis=-1))))
         if n % 4 == 0:
-            flowers.append(placed(flower(random), shift=(x + 0.6 * radius, 0.02, z + 0.5 * radius)))
-    return joined(leaves), joined(flowers)
+            flowers.append(geo.placed(flower(random), shift=(x + 0.6 * radius, 0.02, z + 0.5 * radius)))
+    return geo.joined(leaves), geo.joined(flowers)
 
 
 def flower(random):
@@ -70,15 +58,15 @@ def flower(random):
         x = np.repeat(length * t[:, None], 3, 1)
         lattice = np.stack([x, 0.25 * x * t[:, None] + 0.006 * s**2, width[:, None] * s], axis=-1)
         uv = np.stack(np.broadcast_arrays(0.5 + 0.5 * s, t[:, None]), axis=-1)
-        part = placed(upward(grid_part(lattice, uv)), rotation_z(tilt))
+        part = geo.placed(geo.upward(geo.grid_part(lattice, uv)), geo.rotation_z(tilt))
         for k in range(count):
-            petals.append(placed(part, rotation_y(360.0 * (k + 0.5 * ring) / count + random.uniform(-5, 5))))
-    return joined(petals)
+            petals.append(geo.placed(part, geo.rotation_y(360.0 * (k + 0.5 * ring) / count + random.uniform(-5, 5))))
+    return geo.joined(petals)
 
 
 def boat_frame():
     """World from boat: (rotation, shift)."""
-    return rotation_y(BOAT_YAW) @ rotation_x(BOAT_ROLL) @ rotation_z(BOAT_PITCH), np.array(BOAT_AT)
+    return geo.rotation_y(BOAT_YAW) @ geo.rotation_x(BOAT_ROLL) @ geo.rotation_z(BOAT_PITCH), np.array(BOAT_AT)
 
 
 def in_boat(x, z, margin):
@@ -90,29 +78,30 @@ def in_boat(x, z, margin):
 def make_plants():
     """weeds.glb (under water), reeds.glb (through the surface), grass.glb (on the bank), lilies.glb, flowers.glb."""
     random = np.random.default_rng(2)
-    weeds = {f"weed{n}": tuft(30 + n, 104, 0.42, (0.55, 1.0), (0.015, 0.031), (0.05, 0.28), 8) for n in range(3)}
+    weeds = {f"weed{n}": geo.tuft(30 + n, 104, 0.42, (0.55, 1.0), (0.015, 0.031), (0.05, 0.28), 8) for n in range(3)}
     clumps = [((-3.4, -1.0), (-0.7, 2.2), 11), ((1.2, 3.2), (-2.4, 0.7), 12), ((-4.4, -1.5), (-2.5, -0.9), 7)]
     nodes = []
     for n, (xs, zs, count) in enumerate(clumps):
         for x, z in scatter(n, count, (xs, zs), 0.40, lambda x, z: bed_height(x, z) < -0.5 and not in_boat(x, z, 0.35)):
             y = float(bed_height(x, z))
             size = min((-0.04 - y) / 0.98, 1.15) * random.uniform(0.82, 1.0)
-            nodes.append((f"weed{len(nodes) % 3}", matrix(x, y, z, random.uniform(-40, 40), size)))
+            nodes.append((f"weed{len(nodes) % 3}", geo.matrix(x, y, z, random.uniform(-40, 40), size)))
     write_glb(HERE / "weeds.glb", weeds, nodes)
 
-    reeds = {f"reed{n}": tuft(50 + n, 26, 0.26, (1.1, 1.9), (0.012, 0.022), (0.05, 0.35), 9) for n in range(2)}
+    reeds = {f"reed{n}": geo.tuft(50 + n, 26, 0.26, (1.1, 1.9), (0.012, 0.022), (0.05, 0.35), 9) for n in range(2)}
     line = scatter(11, 15, ((-5.6, 4.6), (-3.6, -2.6)), 0.42, lambda x, z: -0.45 < bed_height(x, z) < 0.05)
     line += [(1.95, -1.75), (2.3, -1.35), (-2.55, -1.75)]
     nodes = [
-        (f"reed{n % 2}", matrix(x, bed_height(x, z), z, random.uniform(0, 360), random.uniform(0.8, 1.05)))
+        (f"reed{n % 2}", geo.matrix(x, bed_height(x, z), z, random.uniform(0, 360), random.uniform(0.8, 1.05)))
         for n, (x, z) in enumerate(line)
     ]
     write_glb(HERE / "reeds.glb", reeds, nodes)
 
-    grass = {"grass0": tuft(70, 90, 0.55, (0.12, 0.42), (0.008, 0.016), (0.2, 0.9), 5, root=-0.10)}
+    grass = {"grass0": geo.tuft(70, 90, 0.55, (0.12, 0.42), (0.008, 0.016), (0.2, 0.9), 5, root=-0.10)}
     spots = scatter(13, 34, ((-6.0, 5.2), (-5.4, -2.9)), 0.50, lambda x, z: bed_height(x, z) > 0.10)
     nodes = [
-        ("grass0", matrix(x, bed_height(x, z), z, random.uniform(0, 360), random.uniform(0.8, 1.3))) for x, z in spots
+        ("grass0", geo.matrix(x, bed_height(x, z), z, random.uniform(0, 360), random.uniform(0.8, 1.3)))
+        for x, z in spots
     ]
     write_glb(HERE / "grass.glb", grass, nodes)
 
@@ -125,41 +114,36 @@ def make_plants():
 
 def make_stones():
     random = np.random.default_rng(6)
-    shapes = {f"stone{n}": boulder((0.24, 0.15, 0.19), 80 + n, 0.2, 14) for n in range(3)}
+    shapes = {f"stone{n}": geo.boulder((0.24, 0.15, 0.19), 80 + n, 0.2, 14) for n in range(3)}
     spots = scatter(23, 20, ((-4.4, 3.4), (-3.4, 1.4)), 0.4, lambda x, z: not in_boat(x, z, 0.1))
     nodes = []
     for n, (x, z) in enumerate(spots):
         size = random.uniform(0.3, 1.0) * (1.3 if z < -2.2 else 1.0)
-        nodes.append((f"stone{n % 3}", matrix(x, bed_height(x, z) + 0.05 * size, z, random.uniform(0, 360), size)))
+        nodes.append((f"stone{n % 3}", geo.matrix(x, bed_height(x, z) + 0.05 * size, z, random.uniform(0, 360), size)))
     write_glb(HERE / "stones.glb", shapes, nodes)
 
 
 def make_boat():
     rotate, shift = boat_frame()
     for name, part in clinker_boat().items():
-        write_glb(HERE / f"{name}.glb", {name: placed(part, rotate, shift)})
+        write_glb(HERE / f"{name}.glb", {name: geo.placed(part, rotate, shift)})
     bow = np.array([1.52, 0.60, 0.0]) @ rotate.T + shift
     post = np.array([-2.75, 0.42, -2.05])
     t = np.linspace(0.0, 1.0, 40)[:, None]
     line = bow + t * (post - bow) - np.array([0.0, 1.0, 0.0]) * 0.55 * 4.0 * t * (1.0 - t) * 0.5
     ring = np.linspace(0.0, 4.0 * np.pi, 40)
     knot = post + np.stack([0.072 * np.cos(ring), -0.012 * ring / np.pi, 0.072 * np.sin(ring)], axis=-1)
-    write_glb(HERE / "rope.glb", {"rope": joined([tube(line, 0.011, 8), tube(knot, 0.012, 8)])})
+    write_glb(HERE / "rope.glb", {"rope": geo.joined([geo.tube(line, 0.011, 8), geo.tube(knot, 0.012, 8)])})
     foot = bed_height(post[0], post[2]) - 0.1
     y = np.linspace(foot, 0.62, 14)
     lean = np.stack([post[0] + 0.02 * np.sin(3 * y), y, post[2] + 0.03 * (y - 0.42)], axis=-1)
-    write_glb(HERE / "post.glb", {"post": tube(lean, np.full(14, 0.062), 16)})
+    write_glb(HERE / "post.glb", {"post": geo.tube(lean, np.full(14, 0.062), 16)})
 
 
 def make_bed(width=2048):
     """bed.glb and bed.jpg: sand with pebbles and algae under water, wet earth and grass above it."""
-    columns, rows = 150, 114
-    x, z = np.meshgrid(np.linspace(*X_M, columns), np.linspace(*Z_M, rows))
-    uv = np.stack([(x - X_M[0]) / (X_M[1] - X_M[0]), (z - Z_M[0]) / (Z_M[1] - Z_M[0])], axis=-1)
-    write_glb(HERE / "bed.glb", {"bed": upward(grid_part(np.stack([x, bed_height(x, z), z], axis=-1), uv))})
-    height = int(width * (Z_M[1] - Z_M[0]) / (X_M[1] - X_M[0]))
-    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
-    x, z = X_M[0] + u * (X_M[1] - X_M[0]), Z_M[0] + v * (Z_M[1] - Z_M[0])
+    write_glb(HERE / "bed.glb", {"bed": geo.ground(bed_height, X_M, Z_M, 150, 114)})
+    x, z = geo.ground_texels(X_M, Z_M, width)
     level = bed_height(x, z)
     fine = fractal2(x, z, 0.09, 3, 31)[..., None]
     broad = fractal2(x, z, 1.1, 4, 33)[..., None]

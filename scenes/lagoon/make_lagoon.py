@@ -14,23 +14,10 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
+import procedural_parts as geo  # noqa: E402
 from corals import brain, sponge, staghorn, starfish, table  # noqa: E402
 from procedural import save_jpg, save_png, write_glb  # noqa: E402
 from procedural_fields import fractal2, noise2, pebbles, periodic, scatter, step  # noqa: E402
-from procedural_parts import (  # noqa: E402
-    board,
-    boulder,
-    grid_part,
-    joined,
-    matrix,
-    placed,
-    rotation_x,
-    rotation_y,
-    rotation_z,
-    tube,
-    tuft,
-    upward,
-)
 
 X_M, Z_M = (-6.4, 6.8), (-6.2, 4.2)  # the bed's rectangle
 BUOY = (-1.55, -0.75)
@@ -58,7 +45,7 @@ def plank(length, width, thick, seed):
     bow = 0.02 * length * (x / length * 2.0) ** 2 * random.uniform(-0.6, 0.6)
     ragged = 0.02 * random.uniform(-1.0, 1.0, (2, 14)) * (np.abs(x) > 0.47 * length)
     low = np.stack([np.stack([x + ragged[k], bow, 0 * x + side * width / 2], -1) for k, side in ((0, -1), (1, 1))])
-    return facing_out(board(low - [0, thick / 2, 0], low + [0, thick / 2, 0]))
+    return facing_out(geo.board(low - [0, thick / 2, 0], low + [0, thick / 2, 0]))
 
 
 def facing_out(part):
@@ -74,31 +61,33 @@ def crate(size=0.52):
     parts, half = [], size / 2
     for turn in (0.0, 90.0, 180.0, 270.0):
         for k in range(3):
-            slat = placed(plank(size, 0.11, 0.018, k), rotation_x(90.0), (0.0, 0.09 + 0.165 * k, half))
-            parts.append(placed(slat, rotation_y(turn)))
-        post = placed(plank(size, 0.05, 0.03, 9), rotation_z(90.0), (half - 0.03, half, half - 0.03))
-        parts.append(placed(post, rotation_y(turn)))
-    parts += [placed(plank(size - 0.04, 0.12, 0.018, k), shift=(0, 0.02, (k - 1.5) * 0.128)) for k in range(4)]
-    return joined(parts)
+            slat = geo.placed(plank(size, 0.11, 0.018, k), geo.rotation_x(90.0), (0.0, 0.09 + 0.165 * k, half))
+            parts.append(geo.placed(slat, geo.rotation_y(turn)))
+        post = geo.placed(plank(size, 0.05, 0.03, 9), geo.rotation_z(90.0), (half - 0.03, half, half - 0.03))
+        parts.append(geo.placed(post, geo.rotation_y(turn)))
+    parts += [geo.placed(plank(size - 0.04, 0.12, 0.018, k), shift=(0, 0.02, (k - 1.5) * 0.128)) for k in range(4)]
+    return geo.joined(parts)
 
 
 def make_driftwood():
     """planks.glb: planks afloat, a crate on the bed, a log on the beach."""
     afloat = [
-        placed(plank(1.45, 0.20, 0.045, 1), rotation_y(24.0) @ rotation_x(2.0), (0.75, 0.018, 0.72)),
-        placed(plank(1.15, 0.17, 0.045, 2), rotation_y(-31.0) @ rotation_z(1.5), (0.20, 0.020, 0.05)),
-        placed(plank(0.85, 0.22, 0.040, 3), rotation_y(66.0), (2.05, 0.018, -0.35)),
+        geo.placed(plank(1.45, 0.20, 0.045, 1), geo.rotation_y(24.0) @ geo.rotation_x(2.0), (0.75, 0.018, 0.72)),
+        geo.placed(plank(1.15, 0.17, 0.045, 2), geo.rotation_y(-31.0) @ geo.rotation_z(1.5), (0.20, 0.020, 0.05)),
+        geo.placed(plank(0.85, 0.22, 0.040, 3), geo.rotation_y(66.0), (2.05, 0.018, -0.35)),
     ]
     y = float(bed_height(-0.55, -1.75)) - 0.02
-    box = placed(crate(), rotation_y(31.0) @ rotation_z(-9.0), (-0.55, y, -1.75))
-    write_glb(HERE / "planks.glb", {"planks": joined([*afloat, box])})
+    box = geo.placed(crate(), geo.rotation_y(31.0) @ geo.rotation_z(-9.0), (-0.55, y, -1.75))
+    write_glb(HERE / "planks.glb", {"planks": geo.joined([*afloat, box])})
     t = np.linspace(0.0, 1.0, 16)
     x, z = 0.9 + 1.7 * t, -3.55 + 0.55 * t + 0.08 * np.sin(5 * t)
-    log = tube(np.stack([x, bed_height(x, z) + 0.05 + 0.10 * t, z], -1), 0.10 - 0.045 * t + 0.008 * np.sin(23 * t), 14)
+    log = geo.tube(
+        np.stack([x, bed_height(x, z) + 0.05 + 0.10 * t, z], -1), 0.10 - 0.045 * t + 0.008 * np.sin(23 * t), 14
+    )
     stub_t = np.linspace(0.0, 1.0, 6)
     start = np.array([x[9], bed_height(x[9], z[9]) + 0.12, z[9]])
-    stub = tube(start + stub_t[:, None] * np.array([0.12, 0.34, 0.10]), 0.045 - 0.025 * stub_t, 10)
-    write_glb(HERE / "log.glb", {"log": joined([log, stub])})
+    stub = geo.tube(start + stub_t[:, None] * np.array([0.12, 0.34, 0.10]), 0.045 - 0.025 * stub_t, 10)
+    write_glb(HERE / "log.glb", {"log": geo.joined([log, stub])})
 
 
 def make_ropes():
@@ -115,16 +104,16 @@ def make_ropes():
     u = np.linspace(0.0, 1.0, 90)
     x, z = -3.0 + 2.5 * u, 0.35 + 0.85 * u + 0.28 * np.sin(5.0 * u) + 0.1 * np.sin(13.0 * u)
     net = np.stack([x, 0.012 + 0 * u, z], axis=-1)
-    write_glb(HERE / "ropes.glb", {"ropes": joined([tube(line, 0.012, 8), tube(net, 0.010, 7)])})
+    write_glb(HERE / "ropes.glb", {"ropes": geo.joined([geo.tube(line, 0.012, 8), geo.tube(net, 0.010, 7)])})
     balls = []
     for k in range(9):
         at = net[5 + 10 * k]
         theta, phi = np.meshgrid(np.linspace(0, np.pi, 11), np.linspace(0, 2 * np.pi, 19), indexing="ij")
         unit = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], -1)
-        body = grid_part(0.062 * unit * [1.0, 0.85, 1.0])
+        body = geo.grid_part(0.062 * unit * [1.0, 0.85, 1.0])
         normals = unit.reshape(-1, 3)
-        balls.append(placed((body[0], normals, body[2], body[3][distinct(body)]), shift=at + [0.0, 0.006, 0.0]))
-    write_glb(HERE / "floats.glb", {"floats": joined(balls)})
+        balls.append(geo.placed((body[0], normals, body[2], body[3][distinct(body)]), shift=at + [0.0, 0.006, 0.0]))
+    write_glb(HERE / "floats.glb", {"floats": geo.joined(balls)})
 
 
 def distinct(part):
@@ -136,14 +125,14 @@ def distinct(part):
 def make_reef():
     """rocks.glb, and one file for each colour of coral."""
     random = np.random.default_rng(8)
-    shapes = {f"rock{n}": boulder((0.42, 0.30, 0.36), 60 + n, 0.24, 16) for n in range(3)}
+    shapes = {f"rock{n}": geo.boulder((0.42, 0.30, 0.36), 60 + n, 0.24, 16) for n in range(3)}
     large = [(2.55, -1.25, 1.35), (3.05, -0.55, 0.95), (-2.75, -2.10, 1.25), (-2.05, -2.45, 0.8), (1.15, -1.55, 0.75)]
     small = scatter(3, 15, ((-3.4, 3.6), (-3.0, 2.2)), 0.55, lambda x, z: bed_height(x, z) < 0.12)
     rocks = large + [(x, z, random.uniform(0.18, 0.45)) for x, z in small]
     nodes = [
         (
             f"rock{n % 3}",
-            matrix(x, bed_height(x, z) + 0.09 * size, z, random.uniform(0, 360), size, random.uniform(-15, 15)),
+            geo.matrix(x, bed_height(x, z) + 0.09 * size, z, random.uniform(0, 360), size, random.uniform(-15, 15)),
         )
         for n, (x, z, size) in enumerate(rocks)
     ]
@@ -153,7 +142,7 @@ def make_reef():
         nodes = []
         for n, (x, z, size, lift) in enumerate(places):
             turn = random.uniform(0, 360)
-            nodes.append((list(shapes)[n % len(shapes)], matrix(x, bed_height(x, z) + lift, z, turn, size)))
+            nodes.append((list(shapes)[n % len(shapes)], geo.matrix(x, bed_height(x, z) + lift, z, turn, size)))
         write_glb(HERE / f"{name}.glb", shapes, nodes)
 
     horns = {"staghorn0": staghorn(1), "staghorn1": staghorn(5)}
@@ -172,23 +161,19 @@ def make_reef():
     stars = [(0.95, 1.0, 0.9, 0.004), (-0.25, 0.25, 1.0, 0.006), (0.35, -2.55, 0.9, 0.01)]
     plant("starfish", {"starfish": starfish()}, stars)
 
-    grass = {"grass": tuft(71, 80, 0.45, (0.15, 0.5), (0.007, 0.013), (0.3, 1.0), 5, root=-0.10)}
+    grass = {"grass": geo.tuft(71, 80, 0.45, (0.15, 0.5), (0.007, 0.013), (0.3, 1.0), 5, root=-0.10)}
     spots = scatter(14, 26, ((-5.5, 6.0), (-6.0, -2.5)), 0.55, lambda x, z: shore(x, z) > 1.55)
     nodes = [
-        ("grass", matrix(x, bed_height(x, z), z, random.uniform(0, 360), random.uniform(0.8, 1.3))) for x, z in spots
+        ("grass", geo.matrix(x, bed_height(x, z), z, random.uniform(0, 360), random.uniform(0.8, 1.3)))
+        for x, z in spots
     ]
     write_glb(HERE / "grass.glb", grass, nodes)
 
 
 def make_bed(width=2048):
     """bed.glb and bed.jpg: pale sand with shell grit, wet along the water's edge."""
-    columns, rows = 144, 114
-    x, z = np.meshgrid(np.linspace(*X_M, columns), np.linspace(*Z_M, rows))
-    uv = np.stack([(x - X_M[0]) / (X_M[1] - X_M[0]), (z - Z_M[0]) / (Z_M[1] - Z_M[0])], axis=-1)
-    write_glb(HERE / "bed.glb", {"bed": upward(grid_part(np.stack([x, bed_height(x, z), z], axis=-1), uv))})
-    height = int(width * (Z_M[1] - Z_M[0]) / (X_M[1] - X_M[0]))
-    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
-    x, z = X_M[0] + u * (X_M[1] - X_M[0]), Z_M[0] + v * (Z_M[1] - Z_M[0])
+    write_glb(HERE / "bed.glb", {"bed": geo.ground(bed_height, X_M, Z_M, 144, 114)})
+    x, z = geo.ground_texels(X_M, Z_M, width)
     level = bed_height(x, z)
     fine, broad = fractal2(x, z, 0.07, 3, 51)[..., None], fractal2(x, z, 1.3, 4, 53)[..., None]
     color = np.array([0.90, 0.84, 0.72]) * (1.0 + 0.06 * fine + 0.06 * broad)

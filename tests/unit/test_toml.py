@@ -15,19 +15,7 @@ from glcaustics.scene.mesh_tools import face_normals, signed_volume
 from glcaustics.scene.toml import load_toml
 from glcaustics.scene.toml_objects import SHAPES
 from glcaustics.scene.water import surface_of
-
-MINIMAL = """
-[camera]
-eye = [0, 1, 3]
-target = [0, 0, 0]
-[[light]]
-kind = "directional"
-intensity = 1000
-direction = [0, -2, 0]
-[[object]]
-shape = "box"
-size_m = [1, 2, 3]
-"""
+from tests.unit.toml_file import MINIMAL, write
 
 SHAPE_KEYS = {
     "box": "size_m = [1, 2, 3]",
@@ -56,12 +44,6 @@ VOLUMES_M3 = {
     "ring": math.pi * (0.36 - 0.25) * 0.4,
     "half_cylinder": 0.5 * math.pi * (0.55**2 - 0.25) * 0.4,
 }
-
-
-def write(folder: Path, text: str) -> Path:
-    path = folder / "test.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 def test_a_minimal_scene(tmp_path: Path) -> None:

@@ -8,26 +8,7 @@ import pytest
 
 from glcaustics.errors import GlcError, SceneError
 from glcaustics.scene import load_scene
-
-MINIMAL = """
-[camera]
-eye = [0, 1, 3]
-target = [0, 0, 0]
-[[light]]
-kind = "directional"
-intensity = 1000
-direction = [0, -2, 0]
-[[object]]
-shape = "box"
-size_m = [1, 2, 3]
-"""
-
-
-def write(folder: Path, text: str) -> Path:
-    path = folder / "test.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
+from tests.unit.toml_file import MINIMAL, write
 
 WATER = "[[water]]\nsize_m = [1, 1]\n"
 MATERIAL = '[[material]]\nname = "m"\n'
