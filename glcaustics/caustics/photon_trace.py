@@ -10,7 +10,7 @@ absorption; every loss counted.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -24,7 +24,7 @@ from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext
 from glcaustics.passes.light_views import LightView, light_uniforms
 from glcaustics.passes.raster import raster_uniforms
 from glcaustics.passes.runner import PlanRunner
-from glcaustics.scene.model import OpticalKind
+from glcaustics.scene.model import Instance, OpticalKind
 
 SHADERS = "caustics/photon_trace"
 LANDED = {1: "by_light_view", 2: "by_eye_view"}
@@ -38,6 +38,7 @@ LOST = {
     -5: "absorbed",
     -6: "normal_faces_away",
     -7: "met_another_specular_surface",
+    -11: "scattered_between_facets",
 }
 CHOICES = {"fresnel": ("split", "chance"), "march": ("hierarchical", "dda")}
 GOLDEN_3D = 1.2207440846057596  # root of x^4 = x + 1: the R3 sequence (Roberts 2018)
@@ -207,6 +208,8 @@ class PhotonTrace(CausticsMethod):
             "BRANCH": BRANCH_CODE[branch.kind],
             "CHANCE": int(options["fresnel"] == "chance"),
             "DDA": int(options["march"] == "dda"),
+            "SIZED": int(light.light.has_size),
+            "ROUGH": int(has_rough_casters(ctx.setup.instances())),
             "HAS_MIRROR": int(branch.kind == REFLECT and OpticalKind.MIRROR in ctx.setup.kinds()),
         }
         program = ctx.device.program(f"{SHADERS}/trace", defines)
@@ -229,6 +232,7 @@ class PhotonTrace(CausticsMethod):
                 "t_objects": ctx.frame.gpu.objects,
                 "u_photon_grid": photon_grid(int(options["photons"]), light.caster),
                 "u_sequence": sequence(ctx.frame.index),
+                "u_frame": ctx.frame.index % (1 << 31),
                 "u_seed": (ctx.setup.seed * 31 + light.index) % (1 << 31),
                 "u_bounds_min_ws": tuple(low),
                 "u_bounds_max_ws": tuple(high),
@@ -282,6 +286,11 @@ def _march_reads(setup: FrameSetup) -> dict[str, str]:
     if setup.options["march"] == "dda":
         return {"t_depth_m": "gbuffer.depth_m"}
     return {"t_bounds_4": "depth_chain.bounds_4", "t_bounds_16": "depth_chain.bounds_16"}
+
+
+def has_rough_casters(instances: Iterable[Instance]) -> bool:
+    """Whether a specular surface scatters light."""
+    return any(i.optical_kind is not OpticalKind.DIFFUSE and i.material.roughness > 0.0 for i in instances)
 
 
 def landing_of(branch: Branch) -> str:

@@ -294,10 +294,12 @@ def light_uniforms(light: Light) -> dict[str, Any]:
     if light.kind is LightKind.SPOT:  # glTF: saturate(cos * scale + offset)^2
         scale = 1.0 / max(1e-3, math.cos(light.inner_cone_rad) - math.cos(light.outer_cone_rad))
         cone = (scale, -math.cos(light.outer_cone_rad) * scale)
+    size = math.sin(0.5 * light.angular_diameter_rad) if is_directional else light.radius_m
     xyz = direction if is_directional else np.asarray(light.position_ws, np.float64)
     return {
         "u_light": (float(xyz[0]), float(xyz[1]), float(xyz[2]), 0.0 if is_directional else 1.0),
         "u_light_intensity": tuple(float(c) for c in intensity),
         "u_light_axis_ws": tuple(float(c) for c in direction),
         "u_light_cone": cone,
+        "u_light_size": size,
     }

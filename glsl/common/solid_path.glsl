@@ -1,11 +1,13 @@
 #include "common/intersect.glsl"
 #include "common/intersect_box.glsl"
+#include "common/brdf.glsl"
 
 // A ray's way through a solid that is known as front and back faces in a light's view (Wyman 2005; here refined by intersection,
 // and followed through total reflections). Pure functions: the maps and the box around the solids are arguments.
 
 #define GLC_TIR -1
 #define GLC_NO_EXIT -4
+#define GLC_BETWEEN_FACETS -11   // scattered into the rough surface that it came from
 
 // Where a ray inside the solid leaves it: the stretch behind its front and before its back faces ends. Needed where the back faces
 // alone give no answer, and after a total reflection, when the way out may be through the front.
@@ -50,9 +52,10 @@ GlcHit glc_leave_inside(sampler2D t_front, sampler2D t_front_normal, sampler2D t
 
 // From the first interface to beyond the last one: p and ray are moved there, flux is what is left, iterations the look-ups.
 // bounces: total reflections that are followed. Returns 0, or why the light is lost.
-int glc_pass_solid(sampler2D t_front, sampler2D t_front_normal, sampler2D t_back, sampler2D t_back_normal, GlcView view,
-                   vec3 box_min, vec3 box_max, vec3 sigma_a, float ior, int estimate, int max_iterations, int march_steps,
-                   int bounces, inout vec3 p, inout vec3 ray, inout vec3 flux, inout float iterations) {
+// alpha > 0: rough surfaces, a microfacet's normal (brdf.glsl) for xi at each of them.
+int glc_pass_rough_solid(sampler2D t_front, sampler2D t_front_normal, sampler2D t_back, sampler2D t_back_normal, GlcView view,
+                         vec3 box_min, vec3 box_max, vec3 sigma_a, float ior, int estimate, int max_iterations, int march_steps,
+                         int bounces, float alpha, vec2 xi, inout vec3 p, inout vec3 ray, inout vec3 flux, inout float iterations) {
     float t_max = glc_box_exit(p, ray, box_min, box_max);
     GlcHit exit = glc_intersect(t_back, t_back_normal, view, p, ray, t_max, estimate, max_iterations, 0);
     iterations += float(exit.iterations);
@@ -70,11 +73,18 @@ int glc_pass_solid(sampler2D t_front, sampler2D t_front_normal, sampler2D t_back
             n = -glc_safe_normalize(textureLod(t_back_normal, projected.xy / view.size, 0.0).xyz, exit.normal_ws);
         }
         if (dot(n, ray) > 0.0) n = -n;
+        vec3 surface_n = n;
+        if (alpha > 0.0) n = glc_ggx_visible_normal(n, -ray, alpha, fract(xi + float(bounce) * vec2(0.61803399, 0.41421356)));
         vec3 outside;
         float reflected_share = glc_fresnel_dielectric(-dot(n, ray), 1.0 / ior);
         bool leaves = glc_refract(ray, n, 1.0 / ior, outside);  // else the mirror direction
         p = exit.position_ws;
         ray = outside;
+        if (alpha > 0.0) {
+            float cos_out = dot(ray, surface_n) * (leaves ? -1.0 : 1.0);
+            if (cos_out <= 0.0) return GLC_BETWEEN_FACETS;
+            flux *= glc_ggx_visible_share(cos_out, alpha);
+        }
         if (leaves) {
             flux *= 1.0 - reflected_share;
             return 0;
@@ -83,4 +93,12 @@ int glc_pass_solid(sampler2D t_front, sampler2D t_front_normal, sampler2D t_back
         exit.status = 0;
     }
     return GLC_TIR;
+}
+
+// The same with smooth surfaces.
+int glc_pass_solid(sampler2D t_front, sampler2D t_front_normal, sampler2D t_back, sampler2D t_back_normal, GlcView view,
+                   vec3 box_min, vec3 box_max, vec3 sigma_a, float ior, int estimate, int max_iterations, int march_steps,
+                   int bounces, inout vec3 p, inout vec3 ray, inout vec3 flux, inout float iterations) {
+    return glc_pass_rough_solid(t_front, t_front_normal, t_back, t_back_normal, view, box_min, box_max, sigma_a, ior, estimate,
+                                max_iterations, march_steps, bounces, 0.0, vec2(0.0), p, ray, flux, iterations);
 }

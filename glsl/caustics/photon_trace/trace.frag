@@ -28,6 +28,7 @@ uniform vec3 u_channels;           // 1 for the colour channels that this branch
 uniform int u_channel;             // channel whose index of refraction is used
 uniform int u_max_iterations;
 uniform int u_march_steps;
+uniform uint u_frame;
 
 layout(location = 0) out vec4 o_landing;  // xy: pixel; z: 1 / area of the receiver in it, 1/m^2; w: status (land.glsl; 0 = no photon)
 layout(location = 1) out vec4 o_flux;     // rgb: flux (carried, or lost when status < 0), W or lm; w: look-ups
@@ -35,6 +36,7 @@ layout(location = 1) out vec4 o_flux;     // rgb: flux (carried, or lost when st
 #define PHOTON_DARK -5
 #define PHOTON_AVERTED -6
 #define PHOTON_SECOND_HIT -7
+const float STEEPEST = 8.0;        // largest weight of a jittered light point (see below)
 const int ESTIMATE = GLC_HYBRID;
 
 vec3 stratum_flux(GlcView view, vec3 p_ws, vec3 d) {
@@ -74,10 +76,28 @@ void main() {
     vec3 flux = stratum_flux(caster_view, p, d) * u_channels;
     if (max(flux.r, max(flux.g, flux.b)) <= 0.0) return;   // outside of a spot's cone
     if (n_dot_l <= 0.0) { o_landing.w = float(PHOTON_AVERTED); o_flux.rgb = flux; return; }
+#if SIZED
+    // The photon starts where the light's centre sees the caster, and comes from another point of the light. At grazing incidence the
+    // weight grows without bound; cutting it costs what falls on the last tan^2 / 64 of the silhouette.
+    vec3 to_centre = d;
+    d = glc_light_jitter(p, to_centre, glc_cell_point(cell, u_frame, u_seed, 0));
+    float jittered_dot_l = -dot(n, d);
+    if (jittered_dot_l <= 0.0) return;   // this point of the light has set
+    flux *= min(jittered_dot_l / (n_dot_l * dot(d, to_centre)), STEEPEST);
+    n_dot_l = jittered_dot_l;
+#endif
     float ior = object.ior[u_channel];
     float eta = from_dense ? 1.0 / ior : ior;
     if (from_dense && u_light.w != 0.0) flux *= glc_transmittance(object.sigma_a, length(p - u_light.xyz));
 
+    vec3 surface_n = n;
+    float alpha = object.roughness * object.roughness;
+#if ROUGH
+    if (alpha > 0.0) {
+        n = glc_ggx_visible_normal(n, -d, alpha, glc_cell_point(cell, u_frame, u_seed, 1));
+        n_dot_l = -dot(n, d);
+    }
+#endif
     vec3 reflected;
     float transmitted;
     split(object, n_dot_l, eta, reflected, transmitted);
@@ -96,12 +116,20 @@ void main() {
     if (!glc_refract(d, n, eta, ray)) { o_landing.w = float(GLC_TIR); o_flux.rgb = flux; return; }
     flux *= transmitted;
     bool in_absorber = object.kind == GLC_INTERFACE && !from_dense;
-#if BRANCH == GLC_IN_AND_OUT
-    int lost = glc_pass_solid(t_caster_position, t_caster_normal, t_back_position, t_back_normal, caster_view, u_caster_min_ws,
-                              u_caster_max_ws, object.sigma_a, ior, ESTIMATE, u_max_iterations, u_march_steps, u_internal_bounces,
-                              p, ray, flux, iterations);
-    if (lost != 0) { o_landing.w = float(lost); o_flux = vec4(flux, iterations); return; }
 #endif
+#if ROUGH
+    if (alpha > 0.0) {
+        float cos_out = dot(ray, surface_n) * (BRANCH == GLC_REFLECT ? 1.0 : -1.0);
+        if (cos_out <= 0.0) { o_landing.w = float(GLC_BETWEEN_FACETS); o_flux.rgb = flux; return; }
+        flux *= glc_ggx_visible_share(cos_out, alpha);
+    }
+#endif
+#if BRANCH == GLC_IN_AND_OUT
+    int lost = glc_pass_rough_solid(t_caster_position, t_caster_normal, t_back_position, t_back_normal, caster_view, u_caster_min_ws,
+                                    u_caster_max_ws, object.sigma_a, ior, ESTIMATE, u_max_iterations, u_march_steps,
+                                    u_internal_bounces, ROUGH == 1 ? alpha : 0.0, glc_cell_point(cell, u_frame, u_seed, 2), p, ray,
+                                    flux, iterations);
+    if (lost != 0) { o_landing.w = float(lost); o_flux = vec4(flux, iterations); return; }
 #endif
     if (max(flux.r, max(flux.g, flux.b)) <= 0.0) { o_landing.w = float(PHOTON_DARK); return; }
 
@@ -121,7 +149,7 @@ void main() {
 #if HAS_MIRROR
     // Light that meets a second mirror on its way is another path (L S S D), which the photons do not follow.
     if (landing.status > 0 && object.kind == GLC_MIRROR) {
-        vec3 lifted = p + n * (2.0 * glc_texel_width(caster_view, p));
+        vec3 lifted = p + surface_n * (2.0 * glc_texel_width(caster_view, p));
         GlcHit second = glc_intersect_march(t_caster_position, t_caster_normal, caster_view, lifted, ray, landing.t, u_march_steps);
         iterations += float(second.iterations);
         if (second.status > 0) landing.status = PHOTON_SECOND_HIT;
