@@ -14,14 +14,14 @@ def pooled(rows: Sequence[Mapping[str, Any]], weights: Sequence[float]) -> dict[
     """One row for all: numbers of things are summed, shares are averaged by weight.
 
     Args:
-        rows: with equal keys; values are int (summed), float or tuples of float (shares); `iterations` is kept.
+        rows: with equal keys; values are int (summed), float or tuples of float (shares); `iterations`, texts kept.
         weights: of the rows, such as the number of rays that a share counts.
     """
     total = max(float(np.sum(weights)), 1e-30)
     found: dict[str, Any] = {}
     for name, first in rows[0].items():
         values = [row[name] for row in rows]
-        if name == "iterations":
+        if name == "iterations" or isinstance(first, str):
             found[name] = first
         elif isinstance(first, int):
             found[name] = int(sum(values))

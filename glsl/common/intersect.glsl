@@ -138,6 +138,8 @@ GlcHit glc_intersect(sampler2D t_position, sampler2D t_normal, GlcView view, vec
     if (estimate != GLC_HYBRID || march_steps == 0) {
         GlcProbe last = glc_probe(t_position, view, o + t * d, t_max);
         if (!last.valid) hit.status = GLC_LEFT;
+        hit.t = t;   // the last estimate, for who judges it
+        hit.position_ws = o + t * d;
         return hit;
     }
     GlcHit marched = glc_intersect_march(t_position, t_normal, view, o, d, t_max, march_steps);
