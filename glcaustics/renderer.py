@@ -12,6 +12,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from glcaustics.caustics.ignored import ignored_parts, ignored_words
 from glcaustics.caustics.method import IRRADIANCE, NOISY_IRRADIANCE, QUALITIES, CausticsMethod
 from glcaustics.caustics.registry import AUTO, NONE, pick
 from glcaustics.denoise import svgf
@@ -282,7 +283,8 @@ class Renderer:
         _aov_resources(self._setup, self.aovs, False, True)
         self.device: Device = create_device(backend, context, shader_root=shader_root)
         self.device.timing_enabled = stats
-        self.announcements = [*scene.announcements, *self.device.announcements]
+        self._ignored = ignored_parts(self._setup.instances(), scene.lights, self._chosen, specular_view=specular_view)
+        self.announcements = [*scene.announcements, *self.device.announcements, *ignored_words(self._ignored)]
         self._gpu = GpuScene(self.device)
         self._time: float | None = None
         self._frames = 0
@@ -548,6 +550,7 @@ class Renderer:
             "bytes_allocated": runner.plan.bytes_allocated,
             "bytes_without_aliasing": runner.plan.bytes_without_aliasing,
             "bytes_without_culling": runner.plan.bytes_without_culling,
+            "ignored": self._ignored,
             "solves": solves,
             "lost_flux": sum(s["flux_lost"] for s in solves) / flux if flux > 0 else None,
         }

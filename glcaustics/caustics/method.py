@@ -31,6 +31,8 @@ class CausticsMethod(ABC):
         option_help: option -> one line with its unit and range.
         noisy: it has the option "denoise"; with it, it writes `NOISY_IRRADIANCE`, which the denoiser takes.
         noise_share: standard deviation of its noise as a share of that of independent photons (Poisson), at most.
+        follows_size_and_roughness: light is spread by the size of its source and by rough specular surfaces; without,
+            sources are points and those surfaces smooth, which is announced.
         unbiased_options: under which its mean is the truth: what closed forms are tested with.
     """
 
@@ -41,6 +43,7 @@ class CausticsMethod(ABC):
     option_help: ClassVar[Mapping[str, str]] = {}
     noisy: ClassVar[bool] = False
     noise_share: ClassVar[float] = 0.0
+    follows_size_and_roughness: ClassVar[bool] = False
     unbiased_options: ClassVar[Mapping[str, Any]] = {}
 
     @classmethod

@@ -54,6 +54,7 @@ class PhotonTrace(CausticsMethod):
     paper = "Meenrattanakorn, Lambers 2022: Real-Time Caustics Using Cascaded Image-Space Photon Tracing"
     noisy = True
     noise_share = 0.4
+    follows_size_and_roughness = True
     unbiased_options: ClassVar[Mapping[str, Any]] = {"denoise": False}
     ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         quality: {

@@ -19,7 +19,6 @@ from glcaustics.scene.gltf_json import Json
 from glcaustics.scene.limits import check_image_size
 from glcaustics.scene.model import MIN_TRANSMISSION, FloatArray, Image, Material
 
-SMOOTH_GLASS_ROUGHNESS = 0.3  # above it real glass would blur its caustics visibly; refraction is computed as smooth
 PAINT_ROUGHNESS = 0.8  # a surface this rough that does not say that it is a metal is none
 REPEAT = 10497  # OpenGL's GL_REPEAT, glTF's default wrap mode
 LEFT_OUT_TEXTURES = ("normalTexture", "occlusionTexture")
@@ -125,10 +124,6 @@ class MaterialReader:
         if glass and "roughnessFactor" not in pbr.value:
             roughness = 0.0
             self._file.announce(f"material '{item.name}' transmits and has no roughnessFactor; it is taken as smooth")
-        if glass and roughness > SMOOTH_GLASS_ROUGHNESS:
-            self._file.announce(
-                f"material '{item.name}': roughness {roughness:g}, but its caustics are those of a smooth surface"
-            )
         return metallic, roughness
 
     def _ior(self, item: Json) -> float:

@@ -21,7 +21,17 @@ from glcaustics.scene.camera_path import CameraKey, camera_path
 from glcaustics.scene.defaults import complete
 from glcaustics.scene.gltf import GltfContents, read_gltf
 from glcaustics.scene.limits import MAX_ANGULAR_DIAMETER_DEG, MAX_COORDINATE_M, check_image_size, check_limits
-from glcaustics.scene.model import Camera, Image, Instance, Light, LightKind, Material, Scene, Sky
+from glcaustics.scene.model import (
+    MIN_TRANSMISSION,
+    Camera,
+    Image,
+    Instance,
+    Light,
+    LightKind,
+    Material,
+    Scene,
+    Sky,
+)
 from glcaustics.scene.strict_table import StrictTable
 from glcaustics.scene.toml_objects import existing_file, read_object
 from glcaustics.scene.toml_water import read_water
@@ -231,16 +241,20 @@ def _read_material(table: StrictTable, folder: Path) -> Material:
         return read_image(existing_file(table, key, folder), srgb=srgb) if table.has(key) else None
 
     default = Material()
+    transmission = table.number("transmission", default.transmission, low=0.0, high=1.0)
+    rough = (
+        default.roughness if transmission < MIN_TRANSMISSION else 0.0
+    )  # who writes glass and no more means clear glass
     material = Material(
         name=table.text("name"),
         base_color=table.vector("base_color", 3, default.base_color, low=0.0, high=1.0),
         base_color_image=image("base_color_image", True),
         metallic=table.number("metallic", default.metallic, low=0.0, high=1.0),
-        roughness=table.number("roughness", default.roughness, low=0.0, high=1.0),
+        roughness=table.number("roughness", rough, low=0.0, high=1.0),
         metallic_roughness_image=image("metallic_roughness_image", False),
         emissive=table.vector("emissive", 3, default.emissive, low=0.0),
         emissive_image=image("emissive_image", True),
-        transmission=table.number("transmission", default.transmission, low=0.0, high=1.0),
+        transmission=transmission,
         ior=table.number("ior", default.ior, low=1.0, high=4.0),
         attenuation_color=table.vector("attenuation_color", 3, default.attenuation_color, low=0.0, high=1.0),
         attenuation_distance_m=table.number("attenuation_distance_m", math.inf, above=0.0, high=math.inf),

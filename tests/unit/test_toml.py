@@ -269,3 +269,13 @@ def test_darkness_can_be_meant(tmp_path: Path) -> None:
     assert len(supplied.lights) == 1 and any("no light" in note for note in supplied.announcements)
     dark = load_toml(write(tmp_path, "light = []\n" + MINIMAL.replace(lit, "")))
     assert dark.lights == () and not any("no light" in note for note in dark.announcements)
+
+
+def test_a_transmissive_material_is_smooth_unless_it_says_otherwise(tmp_path: Path) -> None:
+    materials = "".join(
+        f'[[material]]\nname = "m{i}"\n{keys}\n[[object]]\nshape = "box"\nsize_m = [1, 1, 1]\nmaterial = "m{i}"\n'
+        for i, keys in enumerate(("transmission = 1.0", "transmission = 1.0\nroughness = 0.2", "transmission = 0.4"))
+    )
+    path = tmp_path / "a.toml"
+    path.write_text(materials)
+    assert [i.material.roughness for i in load_scene(path).instances] == [0.0, 0.2, 1.0]
