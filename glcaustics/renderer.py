@@ -47,6 +47,7 @@ BASE_LADDER: dict[str, dict[str, Any]] = {
         "refraction_iterations": iterations,
         "refraction_steps": steps,
         "reflection_steps": reflection,
+        "depth_layers": 1,
     }
     for quality, shadow, rsm_size, solver, iterations, steps, reflection in (
         ("draft", 512, 256, "newton", 3, 256, 24),
@@ -106,6 +107,8 @@ def resolve_options(method: type[CausticsMethod] | None, quality: str, options: 
             raise UsageError(
                 f"option {name} is {value!r}", where="--set", remedy=f"give a whole number from 1, such as {base}"
             )
+        if name == "depth_layers" and value > len(gbuffer.LAYERS):
+            raise UsageError(f"option depth_layers is {value}", where="--set", remedy="use 1 or 2")
     if method is not None:
         method.validate(resolved)
     return resolved
@@ -161,14 +164,28 @@ def _declare(
             gbuffer.declare_back(graph, setup)
         else:
             graph.leave_out("gbuffer.specular_back", "nothing in the scene is a solid with two interfaces")
+        _declare_second_layer(graph, setup, method)
         refraction.declare(graph, setup)
     else:
-        for name in ("gbuffer.specular", "gbuffer.specular_back", "refraction"):
+        for name in ("gbuffer2", "gbuffer.specular", "gbuffer.specular_back", "refraction"):
             graph.leave_out(name, why)
     radiance = "view.radiance" if specular else "shade.radiance"
     tonemap.declare(graph, setup, radiance)
     outputs = ("present.ldr", radiance, *_aov_resources(setup, aovs, specular, caustics))
     return _Declared(graph, tuple(dict.fromkeys(outputs)), radiance, specular)
+
+
+def _declare_second_layer(graph: FrameGraph, setup: FrameSetup, method: CausticsMethod | None) -> None:
+    """What stands behind the first opaque surfaces, shaded like these, for eye rays that end behind something."""
+    if int(setup.options["depth_layers"]) < 2:
+        graph.leave_out("gbuffer2", "one depth layer is asked for; --set depth_layers=2 shows what the first one hides")
+        return
+    gbuffer.declare_second(graph, setup)
+    depth_chain.declare(graph, setup, gbuffer.SECOND)
+    lighting.declare_lighting(graph, setup, gbuffer.SECOND)
+    lighting.declare_shade(graph, setup, gbuffer.SECOND)
+    if method is not None and not method.lights_second_layer and method.why_not(setup.scene) is None:
+        graph.leave_out("caustics2", f"{method.name} brings caustics to the first depth layer alone")
 
 
 def _declare_caustics(graph: FrameGraph, setup: FrameSetup, method: CausticsMethod | None, method_name: str) -> bool:
@@ -193,16 +210,17 @@ def plan_frame(
     aovs: tuple[str, ...] = (),
     *,
     specular_view: bool = True,
+    options: Mapping[str, Any] | None = None,
 ) -> Plan:
     """The frame's plan without any GPU. The receivers' light views are then fitted to the receivers, not yet to the
     landing light.
 
     Raises:
-        UsageError: unknown method, quality or AOV.
+        UsageError: unknown method, quality, AOV or option.
     """
     chosen = pick(_named(scene, method), scene)
     setup = FrameSetup.analyse(
-        scene, size, resolve_options(chosen, quality, {}), transmissive_shadows=chosen is not None
+        scene, size, resolve_options(chosen, quality, options or {}), transmissive_shadows=chosen is not None
     )
     declared = _declare(setup, chosen() if chosen else None, aovs, specular_view, method)
     _, kept = declared.graph.compile(outputs=declared.outputs).kept()

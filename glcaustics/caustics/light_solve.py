@@ -14,12 +14,13 @@ import numpy as np
 
 from glcaustics.caustics.branches import BRANCH_CODE, REFLECT, SOLID, Branch, branches_of, solve_statistics
 from glcaustics.caustics.landing import fit_receivers
-from glcaustics.caustics.method import IRRADIANCE, CausticsMethod
+from glcaustics.caustics.method import CausticsMethod, irradiance_of
 from glcaustics.errors import UsageError
 from glcaustics.gpu import Device
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes import light_view
 from glcaustics.passes.frame import CORE, FrameSetup, FrameState, LightSetup, PassContext, ReceiverView
+from glcaustics.passes.gbuffer import LAYERS
 from glcaustics.passes.light_views import light_uniforms
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.scene.model import OpticalKind
@@ -47,6 +48,7 @@ class LightMapMethod(CausticsMethod):
         "max_radius": (2, 64),
     }
     flags: ClassVar[tuple[str, ...]] = ("reflect", "dispersion")
+    lights_second_layer = True
     cores_add: ClassVar[bool] = (
         False  # True: each sample is drawn in one map, and maps are summed; False: the finest counts
     )
@@ -143,14 +145,20 @@ class LightMapMethod(CausticsMethod):
                 maps.append((light, receiver))
         for name, because in self._left_out:
             graph.leave_out(name, because)
+        for layer in LAYERS[: int(setup.options.get("depth_layers", 1))]:
+            self._declare_gather(graph, setup, maps, layer)
+
+    def _declare_gather(
+        self, graph: FrameGraph, setup: FrameSetup, maps: list[tuple[LightSetup, ReceiverView]], layer: str
+    ) -> None:
         graph.add(
             PassDecl(
-                f"{self.name}.gather",
-                {IRRADIANCE: self.irradiance_desc(setup)},
-                lambda ctx: self._gather(ctx, maps),
+                f"{self.name}.gather{layer}",
+                {irradiance_of(layer): self.irradiance_desc(setup)},
+                lambda ctx: self._gather(ctx, maps, layer),
                 reads=(
-                    "gbuffer.depth_m",
-                    "gbuffer.normal_ws",
+                    f"gbuffer{layer}.depth_m",
+                    f"gbuffer{layer}.normal_ws",
                     *(self.map_resource(light, receiver) for light, receiver in maps),
                     *(light.resource(f"receiver.{receiver.name}.position_ws") for light, receiver in maps),
                 ),
@@ -276,8 +284,8 @@ class LightMapMethod(CausticsMethod):
         )
         ctx.device.draw_points(program, target, copies * width * height, blend="add")
 
-    def _gather(self, ctx: PassContext, maps: list[tuple[LightSetup, ReceiverView]]) -> None:
-        target = ctx.target(IRRADIANCE)
+    def _gather(self, ctx: PassContext, maps: list[tuple[LightSetup, ReceiverView]], layer: str) -> None:
+        target = ctx.target(irradiance_of(layer))
         target.clear(0.0, 0.0, 0.0, 0.0)
         for light, receiver in maps:
             core = None if self.cores_add else light.receivers.get(receiver.name + CORE)
@@ -298,8 +306,8 @@ class LightMapMethod(CausticsMethod):
                 {
                     **ctx.frame.uniforms(),
                     **receiver.view.uniforms("receiver"),
-                    "t_depth_m": ctx.texture("gbuffer.depth_m"),
-                    "t_normal_ws": ctx.texture("gbuffer.normal_ws"),
+                    "t_depth_m": ctx.texture(f"gbuffer{layer}.depth_m"),
+                    "t_normal_ws": ctx.texture(f"gbuffer{layer}.normal_ws"),
                     "t_receiver_position": ctx.texture(light.resource(f"receiver.{receiver.name}.position_ws")),
                     "t_flux": ctx.texture(self.map_resource(light, receiver)),
                     "u_max_taps": int(ctx.setup.options["gather_taps"]) if receiver.inner_ndc is None else CORE_TAPS,

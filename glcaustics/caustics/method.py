@@ -19,6 +19,11 @@ IRRADIANCE = "caustics.irradiance"  # what every method writes: E_c at the camer
 NOISY_IRRADIANCE = "caustics.irradiance_noisy"  # what a noisy method writes instead when it is denoised
 
 
+def irradiance_of(layer: str) -> str:
+    """E_c at the opaque surfaces of a layer of `gbuffer.LAYERS`."""
+    return f"caustics{layer}.irradiance"
+
+
 class CausticsMethod(ABC):
     """A way to compute the caustic irradiance E_c (methods.md 1) at the camera's opaque pixels.
 
@@ -30,6 +35,7 @@ class CausticsMethod(ABC):
         ladder: quality -> options; more cost and less error from step to step.
         option_help: option -> one line with its unit and range.
         noisy: it has the option "denoise"; with it, it writes `NOISY_IRRADIANCE`, which the denoiser takes.
+        lights_second_layer: with two depth layers it writes `irradiance_of` the second one too.
         noise_share: standard deviation of its noise as a share of that of independent photons (Poisson), at most.
         follows_size_and_roughness: light is spread by the size of its source and by rough specular surfaces; without,
             sources are points and those surfaces smooth, which is announced.
@@ -42,6 +48,7 @@ class CausticsMethod(ABC):
     ladder: ClassVar[Mapping[str, Mapping[str, Any]]]
     option_help: ClassVar[Mapping[str, str]] = {}
     noisy: ClassVar[bool] = False
+    lights_second_layer: ClassVar[bool] = False
     noise_share: ClassVar[float] = 0.0
     follows_size_and_roughness: ClassVar[bool] = False
     unbiased_options: ClassVar[Mapping[str, Any]] = {}

@@ -2,40 +2,31 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes.frame import FrameSetup, PassContext
 
 
-def declare(graph: FrameGraph, setup: FrameSetup) -> None:
-    """Two passes, one a level; culled where no pass marches hierarchically."""
-    fine, coarse = ((-(-setup.size[0] // k), -(-setup.size[1] // k)) for k in (4, 16))
-    graph.add(
-        PassDecl(
-            "depth_chain.4",
-            {"depth_chain.bounds_4": TextureDesc("rg32f", fine, "1/m")},
-            _execute_4,
-            reads=("gbuffer.plane",),
-            note="depth bounds of 4 x 4 texels",
+def declare(graph: FrameGraph, setup: FrameSetup, layer: str = "") -> None:
+    """Two passes, one a level, of an opaque layer ("" or `gbuffer.SECOND`); culled where no pass marches over it."""
+    source = f"gbuffer{layer}.plane"
+    for cell in (4, 16):
+        size = tuple(-(-n // cell) for n in setup.size)
+        result = f"depth_chain{layer}.bounds_{cell}"
+        graph.add(
+            PassDecl(
+                f"depth_chain{layer}.{cell}",
+                {result: TextureDesc("rg32f", (size[0], size[1]), "1/m")},
+                partial(_execute, cell, source, result),
+                reads=(source,),
+                note=f"depth bounds of {cell} x {cell} texels",
+            )
         )
-    )
-    graph.add(
-        PassDecl(
-            "depth_chain.16",
-            {"depth_chain.bounds_16": TextureDesc("rg32f", coarse, "1/m")},
-            _execute_16,
-            reads=("depth_chain.bounds_4",),
-            note="depth bounds of 16 x 16 texels",
-        )
-    )
+        source = result
 
 
-def _execute_4(ctx: PassContext) -> None:
-    program = ctx.device.program("passes/depth_chain/bounds_4")
-    program.set(t_plane=ctx.texture("gbuffer.plane"))
-    ctx.device.draw_fullscreen(program, ctx.target("depth_chain.bounds_4"))
-
-
-def _execute_16(ctx: PassContext) -> None:
-    program = ctx.device.program("passes/depth_chain/bounds_16")
-    program.set(t_bounds_4=ctx.texture("depth_chain.bounds_4"))
-    ctx.device.draw_fullscreen(program, ctx.target("depth_chain.bounds_16"))
+def _execute(cell: int, source: str, result: str, ctx: PassContext) -> None:
+    program = ctx.device.program(f"passes/depth_chain/bounds_{cell}")
+    program.set_all({"t_plane" if cell == 4 else "t_bounds_4": ctx.texture(source)})
+    ctx.device.draw_fullscreen(program, ctx.target(result))

@@ -1,36 +1,31 @@
-"""The camera's G-buffer: the opaque layer, the specular layer in front of it, and the specular layer's back faces."""
+"""The camera's G-buffer: one or two opaque layers, the specular layer in front of them, its back faces."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from glcaustics.gpu import Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
+from glcaustics.passes.eye_medium import holds
 from glcaustics.passes.frame import FrameSetup, PassContext
 from glcaustics.passes.geometry import SPECULAR_KINDS, DrawItem
-from glcaustics.scene.model import OpticalKind
+from glcaustics.scene.model import FloatArray, OpticalKind
 
 SHADER = "passes/gbuffer/gbuffer"
-NOTHING = {"HAS_ALBEDO": 0, "HAS_MATERIAL": 0, "HAS_EMISSIVE": 0, "HAS_MOTION": 0, "HAS_PLANE": 0}
+SECOND = "2"  # suffix of the second layer's passes and resources: gbuffer2, lighting2, shade2, caustics2
+LAYERS = ("", SECOND)
+NO_LAYER = {"LAYER_SPECULAR": 0, "BACK": 0, "PEEL": 0}
+NOTHING = {**NO_LAYER, "HAS_ALBEDO": 0, "HAS_MATERIAL": 0, "HAS_EMISSIVE": 0, "HAS_MOTION": 0, "HAS_PLANE": 0}
 
 
 def declare_opaque(graph: FrameGraph, setup: FrameSetup) -> None:
     """Depth, normal, base colour, roughness, emission and motion of the nearest opaque surface."""
-    size = setup.size
-    writes = {
-        "gbuffer.depth_m": TextureDesc("r32f", size, "m"),
-        "gbuffer.normal_ws": TextureDesc("rgba16f", size),
-        "gbuffer.albedo": TextureDesc("rgba16f", size),
-        "gbuffer.material": TextureDesc("rg16f", size),
-        "gbuffer.emissive": TextureDesc("rgba16f", size, "cd/m^2"),
-        "gbuffer.motion": TextureDesc("rg16f", size, "uv"),
-        "gbuffer.plane": TextureDesc("rgba32f", size),
-        "gbuffer.depth": TextureDesc("depth24", size),
-    }
     graph.add(
         PassDecl(
             "gbuffer",
-            writes,
+            {**_layer_writes(setup, ""), "gbuffer.motion": TextureDesc("rg16f", setup.size, "uv")},
             _draw_opaque,
             always_writes=("gbuffer.depth",),
             note="opaque surfaces seen by the eye",
@@ -39,12 +34,66 @@ def declare_opaque(graph: FrameGraph, setup: FrameSetup) -> None:
     )
 
 
+def declare_second(graph: FrameGraph, setup: FrameSetup) -> None:
+    """The same of the next opaque surface behind the nearest one (depth peeling: Everitt 2001). Depth 0 where there is
+    none; `gbuffer2.plane` alone holds the first layer's plane there, so that a wall goes on behind what stands before
+    it. Back faces of closed meshes are left out unless the eye is inside: nobody can see them.
+    """
+    graph.add(
+        PassDecl(
+            "gbuffer2",
+            _layer_writes(setup, SECOND),
+            _draw_second,
+            reads=("gbuffer.plane",),
+            always_writes=("gbuffer2.depth",),
+            note="opaque surfaces behind the first ones",
+            view_dependent=True,
+        )
+    )
+
+
+def _layer_writes(setup: FrameSetup, layer: str) -> dict[str, TextureDesc]:
+    formats = {
+        "depth_m": ("r32f", "m"),
+        "normal_ws": ("rgba16f", ""),
+        "albedo": ("rgba16f", ""),
+        "material": ("rg16f", ""),
+        "emissive": ("rgba16f", "cd/m^2"),
+        "plane": ("rgba32f", ""),
+        "depth": ("depth24", ""),
+    }
+    return {f"gbuffer{layer}.{name}": TextureDesc(f, setup.size, unit) for name, (f, unit) in formats.items()}
+
+
 def _draw_opaque(ctx: PassContext) -> None:
     names = ("depth_m", "normal_ws", "albedo", "material", "emissive", "motion", "plane")
     target = ctx.target(*(f"gbuffer.{n}" for n in names), depth="gbuffer.depth")
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
     live = ctx.locations(**{n.upper(): f"gbuffer.{n}" for n in names})
-    _draw(ctx, target, ctx.frame.gpu.select(OpticalKind.DIFFUSE), {**live, "LAYER_SPECULAR": 0, "BACK": 0}, {})
+    _draw(ctx, target, ctx.frame.gpu.select(OpticalKind.DIFFUSE), {**NO_LAYER, **live}, {})
+
+
+def _draw_second(ctx: PassContext) -> None:
+    names = ("depth_m", "normal_ws", "albedo", "material", "emissive", "plane")
+    target = ctx.target(*(f"gbuffer2.{n}" for n in names), depth="gbuffer2.depth")
+    target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+    first = ctx.texture("gbuffer.plane")
+    if ctx.live("gbuffer2.plane"):
+        copy = ctx.device.program("passes/gbuffer/copy_plane").set(t_plane=first)
+        ctx.device.draw_fullscreen(copy, ctx.target("gbuffer2.plane"))
+    live = ctx.locations(**{n.upper(): f"gbuffer2.{n}" for n in names})
+    defines = {**NO_LAYER, **live, "HAS_MOTION": 0, "PEEL": 1}
+    eye_ws = ctx.frame.camera.world_from_camera[:3, 3]
+    items = ctx.frame.gpu.select(OpticalKind.DIFFUSE)
+    one_sided = [item for item in items if _shows_fronts_only(item, eye_ws)]
+    _draw(ctx, target, one_sided, defines, {"t_first_plane": first}, cull="back")
+    _draw(ctx, target, [i for i in items if i not in one_sided], defines, {"t_first_plane": first})
+
+
+def _shows_fronts_only(item: DrawItem, eye_ws: FloatArray) -> bool:
+    """Whether an eye there can see no back face: of a closed mesh, from outside. Not where mirroring swaps them."""
+    closed = item.instance.mesh.watertight and float(np.linalg.det(item.world_from_object[:3, :3])) > 0.0
+    return closed and not holds(item, eye_ws)
 
 
 def declare_specular(graph: FrameGraph, setup: FrameSetup) -> None:
@@ -73,7 +122,7 @@ def _draw_specular(ctx: PassContext) -> None:
     target = ctx.target(*(f"specular.{n}" for n in names), depth="specular.depth")
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
     live = ctx.locations(**{n.upper(): f"specular.{n}" for n in names})
-    defines = {**NOTHING, **live, "LAYER_SPECULAR": 1, "BACK": 0}
+    defines = {**NOTHING, **live, "LAYER_SPECULAR": 1}
     _draw(
         ctx,
         target,
@@ -106,7 +155,7 @@ def _draw_back(ctx: PassContext) -> None:
     target = ctx.target("specular.back_normal_ws", "specular.back_plane", depth="specular.back_depth")
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
     live = ctx.locations(NORMAL_WS="specular.back_normal_ws", PLANE="specular.back_plane")
-    defines = {**NOTHING, "HAS_DEPTH_M": 0, **live, "LAYER_SPECULAR": 0, "BACK": 1}
+    defines = {**NOTHING, "HAS_DEPTH_M": 0, **live, "BACK": 1}
     fronts = {"t_front_depth_m": ctx.texture("specular.depth_m"), "t_front_normal": ctx.texture("specular.normal_ws")}
     _draw(ctx, target, ctx.frame.gpu.select(OpticalKind.SOLID), defines, fronts, cull="front")
 

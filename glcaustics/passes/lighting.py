@@ -1,4 +1,4 @@
-"""Direct lighting of the opaque layer, and its outgoing radiance."""
+"""Direct lighting of an opaque layer, and its outgoing radiance."""
 
 from __future__ import annotations
 
@@ -9,21 +9,24 @@ from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext
 from glcaustics.passes.light_views import light_uniforms
 from glcaustics.scene.model import OpticalKind
 
+OPTIONAL_LIGHT = ("HIGHLIGHT", "EMISSIVE", "CAUSTICS", "FIRST", "FIRST_CAUSTICS")  # textures that `shade` may lack
 
-def declare_lighting(graph: FrameGraph, setup: FrameSetup) -> None:
-    """Irradiance and highlights of all lights, added up, each with its shadow map."""
+
+def declare_lighting(graph: FrameGraph, setup: FrameSetup, layer: str = "") -> None:
+    """Irradiance and highlights of all lights, added up, each with its shadow map; layer: "" or `gbuffer.SECOND`."""
+    surface = f"gbuffer{layer}"
     graph.add(
         PassDecl(
-            "lighting",
+            f"lighting{layer}",
             {
-                "lighting.irradiance": TextureDesc("rgba32f", setup.size, "lux"),
-                "lighting.highlight": TextureDesc("rgba32f", setup.size, "cd/m^2"),
+                f"lighting{layer}.irradiance": TextureDesc("rgba32f", setup.size, "lux"),
+                f"lighting{layer}.highlight": TextureDesc("rgba32f", setup.size, "cd/m^2"),
             },
-            _execute_lighting,
-            reads=("gbuffer.depth_m", "gbuffer.normal_ws"),
+            lambda ctx: _execute_lighting(ctx, layer),
+            reads=(f"{surface}.depth_m", f"{surface}.normal_ws"),
             optional=(
                 *(light.resource("shadow.depth") for light in setup.lights if light.shadow is not None),
-                *(("gbuffer.albedo", "gbuffer.material") if has_highlights(setup) else ()),
+                *((f"{surface}.albedo", f"{surface}.material") if has_highlights(setup) else ()),
             ),
             note="direct light with shadows",
         )
@@ -36,16 +39,18 @@ def has_highlights(setup: FrameSetup) -> bool:
     return any(m.roughness < 0.95 or m.metallic > 0.05 or m.metallic_roughness_image is not None for m in materials)
 
 
-def _execute_lighting(ctx: PassContext) -> None:
-    highlight = ctx.live("lighting.highlight") and ctx.has("gbuffer.material")
-    target = ctx.target("lighting.irradiance", "lighting.highlight")
+def _execute_lighting(ctx: PassContext, layer: str) -> None:
+    surface = f"gbuffer{layer}"
+    outputs = (f"lighting{layer}.irradiance", f"lighting{layer}.highlight")
+    highlight = ctx.live(outputs[1]) and ctx.has(f"{surface}.material")
+    target = ctx.target(*outputs)
     target.clear(0.0, 0.0, 0.0, 0.0)
     textures: dict[str, Any] = {
-        "t_depth_m": ctx.texture("gbuffer.depth_m"),
-        "t_normal_ws": ctx.texture("gbuffer.normal_ws"),
+        "t_depth_m": ctx.texture(f"{surface}.depth_m"),
+        "t_normal_ws": ctx.texture(f"{surface}.normal_ws"),
     }
     if highlight:
-        textures |= {"t_albedo": ctx.texture("gbuffer.albedo"), "t_material": ctx.texture("gbuffer.material")}
+        textures |= {"t_albedo": ctx.texture(f"{surface}.albedo"), "t_material": ctx.texture(f"{surface}.material")}
     for light in ctx.setup.lights:
         _draw_light(ctx, light, target, textures, highlight)
 
@@ -65,47 +70,54 @@ def _draw_light(ctx: PassContext, light: LightSetup, target: Any, textures: dict
     ctx.device.draw_fullscreen(program, target, blend="add")
 
 
-def declare_shade(graph: FrameGraph, setup: FrameSetup) -> None:
-    """Radiance of the opaque layer: direct, caustic and sky light on its base colour, highlights, emission; the sky
-    behind.
+def declare_shade(graph: FrameGraph, setup: FrameSetup, layer: str = "") -> None:
+    """Radiance of an opaque layer: direct, caustic and sky light on its base colour, highlights, emission; the sky
+    behind. The second layer's picture (and its caustic irradiance) is the first one's where it holds nothing.
     """
     emits = any(any(c > 0.0 for c in i.material.emissive) for i in setup.instances())
+    surface, caustics = f"gbuffer{layer}", TextureDesc("rgba32f", setup.size, "lux", filter="linear")
     graph.add(
         PassDecl(
-            "shade",
-            {"shade.radiance": TextureDesc("rgba32f", setup.size, "cd/m^2", filter="linear")},
-            _execute_shade,
-            reads=("gbuffer.depth_m", "gbuffer.normal_ws", "gbuffer.albedo", "lighting.irradiance"),
-            optional=(
-                "caustics.irradiance",
-                *(("lighting.highlight",) if has_highlights(setup) else ()),
-                *(("gbuffer.emissive",) if emits else ()),
+            f"shade{layer}",
+            {
+                f"shade{layer}.radiance": TextureDesc("rgba32f", setup.size, "cd/m^2", filter="linear"),
+                **({f"shade{layer}.caustic_irradiance": caustics} if layer else {}),
+            },
+            lambda ctx: _execute_shade(ctx, layer),
+            reads=(
+                *(f"{surface}.{name}" for name in ("depth_m", "normal_ws", "albedo")),
+                f"lighting{layer}.irradiance",
+                *(("shade.radiance",) if layer else ()),
             ),
-            note="light on the opaque surfaces' colours, and the sky",
+            optional=(
+                f"caustics{layer}.irradiance",
+                *((f"lighting{layer}.highlight",) if has_highlights(setup) else ()),
+                *((f"{surface}.emissive",) if emits else ()),
+                *(("caustics.irradiance",) if layer else ()),
+            ),
+            note="light on the opaque surfaces' colours, " + ("the first layer elsewhere" if layer else "and the sky"),
         )
     )
 
 
-def _execute_shade(ctx: PassContext) -> None:
-    optional = {
-        "HIGHLIGHT": ("t_highlight", "lighting.highlight"),
-        "EMISSIVE": ("t_emissive", "gbuffer.emissive"),
-        "CAUSTICS": ("t_caustics", "caustics.irradiance"),
+def _execute_shade(ctx: PassContext, layer: str) -> None:
+    resources = {
+        "t_depth_m": f"gbuffer{layer}.depth_m",
+        "t_normal_ws": f"gbuffer{layer}.normal_ws",
+        "t_albedo": f"gbuffer{layer}.albedo",
+        "t_irradiance": f"lighting{layer}.irradiance",
+        "t_highlight": f"lighting{layer}.highlight",
+        "t_emissive": f"gbuffer{layer}.emissive",
+        "t_caustics": f"caustics{layer}.irradiance",
+        **({"t_first": "shade.radiance", "t_first_caustics": "caustics.irradiance"} if layer else {}),
     }
-    program = ctx.device.program("passes/shade/shade", {f"HAS_{k}": int(ctx.has(r)) for k, (_, r) in optional.items()})
-    textures = {name: ctx.texture(resource) for name, resource in optional.values() if ctx.has(resource)}
-    program.set_all(
-        {
-            **ctx.frame.uniforms(),
-            **sky_uniforms(ctx.setup),
-            **textures,
-            "t_depth_m": ctx.texture("gbuffer.depth_m"),
-            "t_normal_ws": ctx.texture("gbuffer.normal_ws"),
-            "t_albedo": ctx.texture("gbuffer.albedo"),
-            "t_irradiance": ctx.texture("lighting.irradiance"),
-        }
-    )
-    ctx.device.draw_fullscreen(program, ctx.target("shade.radiance"))
+    textures = {name: ctx.texture(resource) for name, resource in resources.items() if ctx.has(resource)}
+    outputs = [f"shade{layer}.radiance", *([f"shade{layer}.caustic_irradiance"] if layer else [])]
+    defines = {f"HAS_{name}": int(f"t_{name.lower()}" in textures) for name in OPTIONAL_LIGHT}
+    defines["HAS_CAUSTICS_OUT"] = int(bool(layer) and ctx.live(outputs[1]))
+    program = ctx.device.program("passes/shade/shade", defines)
+    program.set_all({**ctx.frame.uniforms(), **sky_uniforms(ctx.setup), **textures})
+    ctx.device.draw_fullscreen(program, ctx.target(*outputs))
 
 
 def sky_uniforms(setup: FrameSetup) -> dict[str, Any]:

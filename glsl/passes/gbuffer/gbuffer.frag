@@ -1,5 +1,6 @@
-// The camera's G-buffer: opaque layer, specular layer or (BACK) the specular layer's back faces. Only attachments that some
-// pass reads exist (HAS_...). LAYER_SPECULAR keeps what lies in front of the opaque layer.
+// The camera's G-buffer: opaque layer, (PEEL) the opaque layer behind it, specular layer or (BACK) the specular layer's back
+// faces. Only attachments that some pass reads exist (HAS_...). LAYER_SPECULAR keeps what lies in front of the opaque layer.
+// Source of peeling: Everitt 2001; here with a tolerance that follows the first surface's slope.
 #include "common/optics.glsl"
 #if HAS_ALBEDO || HAS_MATERIAL || HAS_EMISSIVE
 #include "interface/objects.glsl"
@@ -23,6 +24,9 @@ uniform vec3 u_eye_ws;
 uniform vec4 u_eye_direction;   // w = 1: orthographic, xyz = view direction
 #if LAYER_SPECULAR
 uniform sampler2D t_opaque_depth_m;
+#endif
+#if PEEL
+uniform sampler2D t_first_plane;
 #endif
 #if BACK
 uniform sampler2D t_front_depth_m;
@@ -60,6 +64,10 @@ layout(location = LOCATION_MOTION) out vec2 o_motion;          // uv now - uv in
 layout(location = LOCATION_PLANE) out vec4 o_plane;            // tangent plane in raster space (common/raster_ray.glsl): g, c; w: depth
 #endif
 
+#if PEEL
+const float PEEL_RELATIVE = 2e-5, PEEL_PIXELS = 0.25;
+#endif
+
 void main() {
 #if HAS_PLANE
     // Derivatives before any discard. The triangle's own plane: smooth normals would not agree with the depths beside it.
@@ -70,6 +78,12 @@ void main() {
 #if LAYER_SPECULAR
     float opaque_m = texelFetch(t_opaque_depth_m, ivec2(gl_FragCoord.xy), 0).r;
     if (opaque_m > 0.0 && v_depth_m >= opaque_m) discard;
+#endif
+#if PEEL
+    // Behind the first surface by more than rounding and a quarter of what its depth changes from pixel to pixel.
+    vec4 first = texelFetch(t_first_plane, ivec2(gl_FragCoord.xy), 0);
+    float slope_m = length(first.xy) * (u_eye_direction.w == 1.0 ? 1.0 : first.w * first.w);
+    if (first.w <= 0.0 || v_depth_m <= first.w * (1.0 + PEEL_RELATIVE) + PEEL_PIXELS * slope_m) discard;
 #endif
 #if BACK
     if (v_depth_m <= texelFetch(t_front_depth_m, ivec2(gl_FragCoord.xy), 0).r) discard;

@@ -1,4 +1,5 @@
-// Outgoing radiance of the opaque layer: albedo / pi x (direct + caustic + sky irradiance) + highlights + emission; the sky elsewhere.
+// Outgoing radiance of an opaque layer: albedo / pi x (direct + caustic + sky irradiance) + highlights + emission. Elsewhere the sky,
+// or for the second layer (HAS_FIRST) what the first one shows, so that a surface goes on without a seam.
 #include "common/optics.glsl"
 #include "interface/camera.glsl"
 #include "interface/sky.glsl"
@@ -16,14 +17,36 @@ uniform sampler2D t_emissive;
 #if HAS_CAUSTICS
 uniform sampler2D t_caustics;
 #endif
+#if HAS_FIRST
+uniform sampler2D t_first;
+#endif
+#if HAS_CAUSTICS_OUT && HAS_FIRST_CAUSTICS
+uniform sampler2D t_first_caustics;
+#endif
 
 in vec2 v_uv;
 layout(location = 0) out vec4 o_radiance;   // alpha: depth in metres, 0 = sky; refraction tells surfaces apart by it
+#if HAS_CAUSTICS_OUT
+layout(location = 1) out vec4 o_caustics;   // E_c of the same surfaces
+#endif
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float depth_m = texelFetch(t_depth_m, pixel, 0).r;
+#if HAS_CAUSTICS_OUT
+    o_caustics = vec4(0.0);
+#if HAS_CAUSTICS
+    o_caustics = texelFetch(t_caustics, pixel, 0);
+#endif
+#if HAS_FIRST_CAUSTICS
+    if (depth_m <= 0.0) o_caustics = texelFetch(t_first_caustics, pixel, 0);
+#endif
+#endif
     if (depth_m <= 0.0) {
+#if HAS_FIRST
+        o_radiance = texelFetch(t_first, pixel, 0);
+        return;
+#endif
         o_radiance = vec4(glc_sky_radiance(glc_camera_ray_ws(v_uv)), 0.0);
         return;
     }
