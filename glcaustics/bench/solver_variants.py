@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import moderngl
 import numpy as np
 import numpy.typing as npt
 
@@ -73,7 +72,7 @@ class VariantBench:
         valid = (buffers.depth_m > 0.0).astype(np.float64)[..., None]
         weighed = np.concatenate([buffers.plane[..., :3] * valid, valid], axis=-1)
         four = np.ones_like(buffers.ray[..., :1])
-        self._textures: dict[str, moderngl.Texture] = {
+        self._textures: dict[str, Any] = {
             "t_origin": self._upload(np.concatenate([buffers.origin_ws, four], axis=-1)),
             "t_direction": self._upload(buffers.ray),
             "t_plane": self._upload(buffers.plane),
@@ -84,7 +83,7 @@ class VariantBench:
         self._target = device.texture(buffers.size, "rgba32f")
         self._framebuffer = device.framebuffer([self._target])
 
-    def _upload(self, data: FloatArray, format: str = "rgba32f", **how: Any) -> moderngl.Texture:
+    def _upload(self, data: FloatArray, format: str = "rgba32f", **how: Any) -> Any:
         content = np.ascontiguousarray(data, np.float32)
         return self.device.texture((data.shape[1], data.shape[0]), format, data=content, **how)
 
