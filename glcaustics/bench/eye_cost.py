@@ -10,7 +10,7 @@ from typing import Any
 from glcaustics.renderer import Renderer
 from glcaustics.scene.model import Camera, Scene
 
-_PARTS = ("depth_chain.4", "depth_chain.16", "refraction")
+_PARTS = ("depth_chain.4", "depth_chain.levels", "refraction")
 _STAGES = ("opaque", "first", "mask", "marching", "reflection")
 
 

@@ -286,7 +286,7 @@ def _march_reads(setup: FrameSetup) -> dict[str, str]:
     """Samplers and resources of the march in the camera's view, besides the planes."""
     if setup.options["march"] == "dda":
         return {"t_depth_m": "gbuffer.depth_m"}
-    return {"t_bounds_4": "depth_chain.bounds_4", "t_bounds_16": "depth_chain.bounds_16"}
+    return {"t_bounds": "depth_chain.bounds"}
 
 
 def has_rough_casters(instances: Iterable[Instance]) -> bool:

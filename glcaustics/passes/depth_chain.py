@@ -1,4 +1,4 @@
-"""Bounds of the opaque layer's depth over 4 x 4 and 16 x 16 texels: what hierarchical marching skips by."""
+"""Bounds of an opaque layer's depth over cells of 4, 16 and 64 texels squared: what hierarchical marching skips by."""
 
 from __future__ import annotations
 
@@ -8,25 +8,48 @@ from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes.frame import FrameSetup, PassContext
 
 
+def _cells(size: tuple[int, int], texels: int) -> tuple[int, int]:
+    return -(-size[0] // texels), -(-size[1] // texels)
+
+
 def declare(graph: FrameGraph, setup: FrameSetup, layer: str = "") -> None:
-    """Two passes, one a level, of an opaque layer ("" or `gbuffer.SECOND`); culled where no pass marches over it."""
-    source = f"gbuffer{layer}.plane"
-    for cell in (4, 16):
-        size = tuple(-(-n // cell) for n in setup.size)
-        result = f"depth_chain{layer}.bounds_{cell}"
-        graph.add(
-            PassDecl(
-                f"depth_chain{layer}.{cell}",
-                {result: TextureDesc("rg32f", (size[0], size[1]), "1/m")},
-                partial(_execute, cell, source, result),
-                reads=(source,),
-                note=f"depth bounds of {cell} x {cell} texels",
-            )
+    """Two passes: the finest level, then all levels in one texture, `depth_chain<layer>.bounds` (`glc_bounds_texel`).
+
+    `layer`: suffix of an opaque layer of the G-buffer. Culled where no pass marches over it.
+    """
+    fine, middle, coarse = (_cells(setup.size, texels) for texels in (4, 16, 64))
+    planes, finest, levels = f"gbuffer{layer}.plane", f"depth_chain{layer}.bounds_4", f"depth_chain{layer}.bounds"
+    graph.add(
+        PassDecl(
+            f"depth_chain{layer}.4",
+            {finest: TextureDesc("rg32f", fine, "1/m")},
+            partial(_execute_finest, planes, finest),
+            reads=(planes,),
+            note="depth bounds of 4 x 4 texels",
         )
-        source = result
+    )
+    size = (fine[0] + middle[0], max(fine[1], middle[1] + coarse[1]))
+    graph.add(
+        PassDecl(
+            f"depth_chain{layer}.levels",
+            {levels: TextureDesc("rg32f", size, "1/m")},
+            partial(_execute_levels, finest, levels),
+            reads=(finest,),
+            note="depth bounds of 4 x 4, 16 x 16 and 64 x 64 texels, side by side",
+        )
+    )
 
 
-def _execute(cell: int, source: str, result: str, ctx: PassContext) -> None:
-    program = ctx.device.program(f"passes/depth_chain/bounds_{cell}")
-    program.set_all({"t_plane" if cell == 4 else "t_bounds_4": ctx.texture(source)})
-    ctx.device.draw_fullscreen(program, ctx.target(result))
+def _execute_finest(planes: str, finest: str, ctx: PassContext) -> None:
+    program = ctx.device.program("passes/depth_chain/bounds_4")
+    program.set(t_plane=ctx.texture(planes))
+    ctx.device.draw_fullscreen(program, ctx.target(finest))
+
+
+def _execute_levels(finest: str, levels: str, ctx: PassContext) -> None:
+    size = ctx.setup.size
+    right, above = _cells(size, 4)[0], _cells(size, 16)[1]
+    for texels, origin in ((4, (0, 0)), (16, (right, 0)), (64, (right, above))):
+        program = ctx.device.program("passes/depth_chain/levels", {"STEP": texels // 4})
+        program.set(t_bounds_4=ctx.texture(finest), u_origin=origin)
+        ctx.device.draw_fullscreen(program, ctx.target(levels), viewport=(*origin, *_cells(size, texels)))

@@ -21,7 +21,7 @@ SOLVERS: dict[str, str] = {
     "hierarchical": "marching over a chain of depth bounds (Uludag 2014)",
     "sousa": "the straight pixel, moved (Sousa 2005)",
 }
-PLANES, CHAIN = ("gbuffer.plane",), ("depth_chain.bounds_4", "depth_chain.bounds_16")
+PLANES, CHAIN = ("gbuffer.plane",), ("depth_chain.bounds",)
 _MARCH = {"cascade": 2, "newton": 0, "dda": 1, "hierarchical": 2, "sousa": 0}
 OUTPUTS = {
     "RADIANCE": "view.radiance",
@@ -148,8 +148,7 @@ def _textures(ctx: PassContext) -> dict[str, Any]:
         "t_specular_depth_m": "specular.depth_m",
         "t_specular_normal": "specular.normal_ws",
         "t_plane": "gbuffer.plane",
-        "t_bounds_4": "depth_chain.bounds_4",
-        "t_bounds_16": "depth_chain.bounds_16",
+        "t_bounds": "depth_chain.bounds",
         "t_front_plane": "specular.plane",
         "t_front_normal": "specular.normal_ws",
         "t_back_plane": "specular.back_plane",

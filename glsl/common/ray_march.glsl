@@ -59,86 +59,107 @@ GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, 
     return solve;
 }
 
-// The same samples over bounds of s, t_bounds_4 and t_bounds_16 (rg32f, largest and smallest s of 4 x 4 and 16 x 16 texels): whole
-// cells that the ray is in front of, or stays behind, are skipped, so it finds what the pixel-exact march finds. Where that finds
-// nothing, it takes the first texel whose plane the ray crosses although no centre's depth told (blades seen edge-on).
-GlcSolve glc_march_hierarchical(sampler2D t_bounds_4, sampler2D t_bounds_16, sampler2D t_plane, GlcRasterRay ray, int max_steps) {
+// Where the bounds of a cell of 4 x 4, 16 x 16 or 64 x 64 texels lie in their texture: the finest level at the left, beside it the
+// others, one over the other. size: of the picture, in texels.
+ivec2 glc_bounds_texel(vec2 index, float cell, vec2 size) {
+    vec2 coarse = vec2(ceil(size.x / 4.0), cell < 32.0 ? 0.0 : ceil(size.y / 16.0));
+    return ivec2(index + (cell < 8.0 ? vec2(0.0) : coarse));
+}
+
+// The same samples over bounds of s in cells of 4 x 4, 16 x 16 and 64 x 64 texels, one texture (rg32f, largest and smallest s; see
+// glc_bounds_texel): whole cells that the ray is in front of, or stays behind, are skipped, so it finds what the pixel-exact march
+// finds. Where that finds nothing, it takes the first texel whose plane the ray crosses although no centre's depth told (blades seen
+// edge-on). Two loops take turns, since a software renderer runs all of a loop's body for every pixel: over cells, one fetch a step,
+// and over the texels of the one cell that could not be skipped.
+GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRasterRay ray, int max_steps) {
     GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_DIVERGED, 0);
-    GlcSolve crossed = solve;
-    vec2 last = vec2(textureSize(t_plane, 0)) - 1.0;
-    vec2 inverse = 1.0 / mix(ray.step.xy, vec2(1e-6), lessThan(abs(ray.step.xy), vec2(1e-6)));
-    vec2 ahead = vec2(greaterThan(inverse, vec2(0.0)));
+    vec3 crossed = vec3(-1.0);   // u and texel
+    vec2 size = vec2(textureSize(t_plane, 0));
+    // Along the ray all is counted in samples: one a pixel of the longer axis.
     float pixels = max(max(abs(ray.step.x), abs(ray.step.y)) * ray.u_screen, 1.0);
-    float du = ray.u_screen / pixels, count = ceil(pixels), at = 0.0, cell = 4.0;
-    bool front = true, entered = false, ended = false;
+    float du = ray.u_screen / pixels, count = ceil(pixels), at = 0.0, cell = pixels > 32.0 ? 64.0 : 16.0;
+    vec3 stride = du * ray.step;
+    vec3 inverse = 1.0 / mix(stride, vec3(1e-12), lessThan(abs(stride), vec3(1e-12)));
+    vec2 ahead = vec2(greaterThan(inverse.xy, vec2(0.0)));
+    bool front = true, ended = false, hit = false;
     int i = 0;
-    // The inner loop only walks: what a software renderer runs for every pixel of a group, taken or not, stays small.
-    for (int candidate = 0; candidate < 8 && i < max_steps && !ended; ++candidate) {
+    for (int candidate = 0; candidate < 64 && i < max_steps && !ended; ++candidate) {
+        float leave = at, range = 0.0;   // of the cell that cannot be skipped: first sample beyond it, extent of s
         for (; i < max_steps; ++i) {
-            float u = min(at * du, ray.u_screen);
-            vec3 p = ray.start + u * ray.step;
-            vec2 px = clamp(p.xy, vec2(0.0), last + 0.999);
-            vec2 index = floor(px / cell);
-            float next = at + 1.0;
-            bool over, under;   // in front of all of the cell; behind all of it as before
-            if (cell > 1.0) {
-                vec2 leaves = ((index + ahead) * cell - ray.start.xy) * inverse;
-                float u_exit = clamp(min(leaves.x, leaves.y), u, ray.u_screen);
-                float s_exit = ray.start.z + u_exit * ray.step.z;
-                vec2 bounds = cell > 4.0 ? texelFetch(t_bounds_16, ivec2(index), 0).rg : texelFetch(t_bounds_4, ivec2(index), 0).rg;
-                over = min(p.z, s_exit) > bounds.x;
-                under = !front && max(p.z, s_exit) < bounds.y;
-                next = max(next, ceil(u_exit / du));
-            } else {
-                vec4 plane = texelFetch(t_plane, ivec2(index), 0);
-                over = plane.w <= 0.0 || p.z > plane.z + dot(plane.xy, index + 0.5);
-                under = !over;
-                entered = under && front;
-                solve.u = u;
-                vec2 f = glc_raster_plane(ray, plane);
-                float met = f.x / (f.y < 0.0 ? f.y : -1e-30);
-                vec2 off = abs(ray.start.xy + met * ray.step.xy - index - 0.5);
-                if (crossed.status != GLC_SOLVE_HIT && f.y < 0.0 && met >= 0.0 && met <= 1.0 && max(off.x, off.y) <= GLC_SOLVE_TOLERANCE_PX)
-                    crossed = GlcSolve(met, met, index, max(off.x, off.y), GLC_SOLVE_HIT, i + 1);
-            }
-            solve.iterations = i + 1;
-            if (over || under) {
-                front = over;
-                at = next;
-                if (at > count) {
-                    ended = true;
-                }
-                if (over) solve.u_front = min((at - 1.0) * du, ray.u_screen);
-                // Up again only where a new coarser cell begins, so that the march does not flutter between levels.
-                vec2 coarser = floor((ray.start.xy + at * du * ray.step.xy) / (4.0 * cell));
-                if (cell < 16.0 && coarser != floor(px / (4.0 * cell))) cell *= 4.0;
-            } else {
-                cell *= 0.25;
-            }
-            if (entered || ended) break;
+            vec3 p = ray.start + at * stride;
+            vec2 index = floor(clamp(p.xy, vec2(0.0), size - 0.001) / cell);
+            vec2 edge = index + ahead;
+            vec2 leaves = (edge * cell - ray.start.xy) * inverse.xy;
+            float exit = clamp(min(leaves.x, leaves.y), at, count);
+            float s_exit = ray.start.z + exit * stride.z;
+            vec2 bounds = texelFetch(t_bounds, glc_bounds_texel(index, cell, size), 0).rg;
+            bool over = min(p.z, s_exit) > bounds.x;
+            bool under = !front && max(p.z, s_exit) < bounds.y;
+            leave = max(at + 1.0, ceil(exit));
+            range = bounds.x - bounds.y;
+            bool skips = over || under;
+            if (!skips && cell < 8.0) break;
+            // Where the ray comes down to the nearest of the cell: nothing is met before.
+            float down = p.z > bounds.x ? min(floor((bounds.x - ray.start.z) * inverse.z), leave - 1.0) : at;
+            at = skips ? leave : max(at, down);
+            front = skips ? over : (p.z > bounds.x || front);
+            ended = at > count;
+            // Up again only where a new coarser cell begins, so that the march does not flutter between levels.
+            vec2 begins = abs(fract(0.25 * edge));
+            bool up = cell < 64.0 && (leaves.x < leaves.y ? begins.x : begins.y) == 0.0;
+            cell *= skips ? (up ? 4.0 : 1.0) : 0.25;
+            if (ended) break;
         }
-        i += 1;
-        if (entered && glc_march_settle(t_plane, ray, 2.5 * du, solve)) return solve;
-        entered = false;
+        bool again = false;
+        for (; i < max_steps && !ended; ++i) {
+            float u = again ? solve.u : min(at * du, ray.u_screen);
+            vec3 p = ray.start + u * ray.step;
+            vec2 texel = floor(clamp(p.xy, vec2(0.0), size - 0.001));
+            vec4 plane = texelFetch(t_plane, ivec2(texel), 0);
+            vec2 f = glc_raster_plane(ray, plane);
+            float met = f.x / (f.y < 0.0 ? f.y : -1e-30);
+            vec2 off = abs(ray.start.xy + met * ray.step.xy - texel - 0.5);
+            float error_px = max(off.x, off.y);
+            bool over = plane.w <= 0.0 || p.z > plane.z + dot(plane.xy, texel + 0.5);
+            bool meets = f.y < 0.0 && met >= 0.0 && met <= 1.0;
+            bool within = meets && error_px <= GLC_SOLVE_TOLERANCE_PX;
+            crossed = within && crossed.x < 0.0 ? vec3(met, texel) : crossed;
+            // The first texel that the ray is behind: its plane is met there or, looked at again, in a texel nearby.
+            bool close = meets && abs(met - at * du) <= 2.5 * du && (again || (front && !over));
+            hit = within && close;
+            solve = GlcSolve(close ? met : u, solve.u_front, texel, error_px, GLC_SOLVE_HIT, i + 1);
+            front = again ? front : over;
+            again = close && !hit && !again;
+            // In a cell that is one plane, on to where that is met.
+            bool flat_cell = range < 5.0 * (abs(plane.x) + abs(plane.y));
+            float next = over && meets && flat_cell ? clamp(ceil(met / du), at + 1.0, leave) : at + 1.0;
+            at = again ? at : next;
+            ended = at > count;
+            if (hit || (!again && (at >= leave || ended))) break;
+        }
+        if (hit) break;
+        solve.u_front = front ? min((at - 1.0) * du, ray.u_screen) : solve.u_front;
     }
-    if (ended) solve.status = ray.u_screen < 1.0 ? GLC_SOLVE_OFFSCREEN : (front ? GLC_SOLVE_NOTHING : GLC_SOLVE_HIDDEN);
+    if (hit) return solve;
+    if (crossed.x >= 0.0) return GlcSolve(crossed.x, crossed.x, crossed.yz, 0.0, GLC_SOLVE_HIT, i);
     solve.u = ray.u_screen;
-    crossed.iterations = solve.iterations;
-    if (crossed.status == GLC_SOLVE_HIT) return crossed;
+    solve.iterations = i;
+    solve.status = GLC_SOLVE_DIVERGED;
+    if (ended) solve.status = ray.u_screen < 1.0 ? GLC_SOLVE_OFFSCREEN : (front ? GLC_SOLVE_NOTHING : GLC_SOLVE_HIDDEN);
     return solve;
 }
 
 // Whether the way to a hit of Newton's method is clear: ray points on it against the nearest s of 4 x 4 texels around them. False:
 // something may stand before one of them, the ray may have met it first. Points one to `count`, a cell apart where the ray is short.
-bool glc_way_is_clear(sampler2D t_bounds_4, GlcRasterRay ray, GlcSolve solve, int count) {
-    vec2 last = vec2(textureSize(t_bounds_4, 0)) - 1.0;
+bool glc_way_is_clear(sampler2D t_bounds, vec2 size, GlcRasterRay ray, GlcSolve solve, int count) {
     vec2 way = abs(solve.u * ray.step.xy);
     int points = min(int(max(way.x, way.y) / 4.0), count);
     float stride = solve.u / float(points + 1);
     float clear = 1.0;
     for (int i = 1; i <= points; ++i) {
         vec3 p = ray.start + float(i) * stride * ray.step;
-        clear = min(clear, p.z - texelFetch(t_bounds_4, ivec2(clamp(p.xy / 4.0, vec2(0.0), last)), 0).r);
+        vec2 index = floor(clamp(p.xy, vec2(0.0), size - 0.001) / 4.0);
+        clear = min(clear, p.z - texelFetch(t_bounds, ivec2(index), 0).r);
     }
     return clear > 0.0;
 }

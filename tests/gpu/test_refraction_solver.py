@@ -32,8 +32,7 @@ uniform sampler2D t_origin;
 uniform sampler2D t_direction;
 uniform sampler2D t_plane;
 uniform sampler2D t_depth;
-uniform sampler2D t_bounds_4;
-uniform sampler2D t_bounds_16;
+uniform sampler2D t_bounds;
 uniform mat4 u_raster_from_world;
 uniform vec2 u_size;
 uniform int u_solver;
@@ -46,7 +45,7 @@ void main() {
     GlcSolve solve;
     if (u_solver == 0) solve = glc_newton(t_plane, ray, 1.0, u_iterations);
     else if (u_solver == 1) solve = glc_march_dda(t_depth, t_plane, false, ray, u_iterations);
-    else solve = glc_march_hierarchical(t_bounds_4, t_bounds_16, t_plane, ray, u_iterations);
+    else solve = glc_march_hierarchical(t_bounds, t_plane, ray, u_iterations);
     o_solve = vec4(glc_raster_distance(ray, solve.u), solve.error_px, float(solve.status), float(solve.iterations));
 }
 """
@@ -81,8 +80,7 @@ class Bench:
             "t_depth": upload(depth[..., None], "r32f"),
             "t_origin": upload(four, "rgba32f"),
             "t_direction": upload(ray, "rgba32f"),
-            "t_bounds_4": upload(fine, "rg32f"),
-            "t_bounds_16": upload(pool(fine), "rg32f"),
+            "t_bounds": upload(levels(fine), "rg32f"),
         }
         out = device.texture((origin.shape[1], origin.shape[0]), "rgba32f")
         framebuffer = device.framebuffer([out])
@@ -114,6 +112,18 @@ def pool(fine: FloatArray) -> FloatArray:
     padded = np.pad(fine, ((0, h - fine.shape[0]), (0, w - fine.shape[1]), (0, 0)), mode="edge")
     blocks = padded.reshape(h // 4, 4, w // 4, 4, 2)
     return np.stack([blocks[..., 0].max(axis=(1, 3)), blocks[..., 1].min(axis=(1, 3))], axis=-1)
+
+
+def levels(fine: FloatArray) -> FloatArray:
+    """The three levels in one texture, as `glc_bounds_texel` finds them."""
+    middle = pool(fine)
+    coarse = pool(middle)
+    height = max(fine.shape[0], middle.shape[0] + coarse.shape[0])
+    made = np.zeros((height, fine.shape[1] + middle.shape[1], 2))
+    made[: fine.shape[0], : fine.shape[1]] = fine
+    made[: middle.shape[0], fine.shape[1] :] = middle
+    made[middle.shape[0] : middle.shape[0] + coarse.shape[0], fine.shape[1] : fine.shape[1] + coarse.shape[1]] = coarse
+    return made
 
 
 def bounds(depth: FloatArray, planes: FloatArray) -> FloatArray:

@@ -56,7 +56,7 @@ def passes_of(solver: str) -> set[str]:
 
 
 def test_depth_chain_exists_only_where_something_marches_over_it() -> None:
-    chain = {"depth_chain.4", "depth_chain.16"}
+    chain = {"depth_chain.4", "depth_chain.levels"}
     for solver in SOLVERS:
         assert bool(chain & passes_of(solver)) == (solver in ("cascade", "hierarchical")), solver
 

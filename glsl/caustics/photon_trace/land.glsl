@@ -8,8 +8,7 @@ uniform sampler2D t_plane;       // of the camera's G-buffer
 #if DDA
 uniform sampler2D t_depth_m;
 #else
-uniform sampler2D t_bounds_4;
-uniform sampler2D t_bounds_16;
+uniform sampler2D t_bounds;
 #endif
 uniform int u_view_steps;
 
@@ -109,7 +108,7 @@ void photon_march(vec3 o, vec3 d, float t0, float t1, inout PhotonLanding landin
 #if DDA
     GlcSolve solve = glc_march_dda(t_depth_m, t_plane, u_camera_lens.z != 0.0, ray, u_view_steps);
 #else
-    GlcSolve solve = glc_march_hierarchical(t_bounds_4, t_bounds_16, t_plane, ray, u_view_steps);
+    GlcSolve solve = glc_march_hierarchical(t_bounds, t_plane, ray, u_view_steps);
 #endif
     landing.lookups += solve.iterations;
     if (solve.status == GLC_SOLVE_HIT) {

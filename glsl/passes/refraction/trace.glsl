@@ -12,10 +12,7 @@ uniform sampler2D t_opaque_depth_m;
 uniform sampler2D t_plane;
 #endif
 #if USE_MARCH == 2 || !FINAL
-uniform sampler2D t_bounds_4;
-#endif
-#if USE_MARCH == 2
-uniform sampler2D t_bounds_16;
+uniform sampler2D t_bounds;
 #endif
 #if HAS_CAUSTICS_VIEW
 uniform sampler2D t_caustics;
@@ -118,7 +115,7 @@ Seen look_sousa(GlcRasterRay ray, vec3 p, vec3 d) {
 #if USE_MARCH == 1
 #define MARCH(ray, steps) glc_march_dda(t_opaque_depth_m, t_plane, ORTHOGRAPHIC == 1, ray, steps)
 #elif USE_MARCH == 2
-#define MARCH(ray, steps) glc_march_hierarchical(t_bounds_4, t_bounds_16, t_plane, ray, steps)
+#define MARCH(ray, steps) glc_march_hierarchical(t_bounds, t_plane, ray, steps)
 #endif
 
 // Along a refracted ray. solved: false where a later stage should look again.
@@ -147,7 +144,7 @@ Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved) {
         bool mixes;
         seen = seen_hit(ray, solve, status, mixes);
 #if !FINAL
-        solved = !mixes && glc_way_is_clear(t_bounds_4, ray, solve, CLEAR_POINTS);
+        solved = !mixes && glc_way_is_clear(t_bounds, u_raster_size, ray, solve, CLEAR_POINTS);
 #endif
         return seen;
     }
