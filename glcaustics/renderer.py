@@ -20,6 +20,7 @@ from glcaustics.errors import UsageError
 from glcaustics.gpu import Device, create_device
 from glcaustics.graph import FrameGraph, Plan
 from glcaustics.passes import depth_chain, gbuffer, lighting, refraction, rsm, shadow_map, tonemap
+from glcaustics.passes.eye_medium import EyeMediumFinder
 from glcaustics.passes.frame import CameraState, FrameSetup, FrameState
 from glcaustics.passes.geometry import GpuScene
 from glcaustics.passes.runner import PlanRunner
@@ -92,6 +93,8 @@ def resolve_options(method: type[CausticsMethod] | None, quality: str, options: 
     resolved: dict[str, Any] = dict(BASE_LADDER[quality])
     if method is not None:
         resolved |= {**getattr(method, "defaults", {}), **method.ladder[quality]}
+        if method.noisy:
+            resolved = {**svgf.DEFAULTS, **resolved}
     for name, value in options.items():
         if name not in resolved:
             raise UsageError(
@@ -111,6 +114,8 @@ def resolve_options(method: type[CausticsMethod] | None, quality: str, options: 
             raise UsageError(f"option depth_layers is {value}", where="--set", remedy="use 1 or 2")
     if method is not None:
         method.validate(resolved)
+        if method.noisy:
+            svgf.check_options(resolved)
     return resolved
 
 
@@ -307,6 +312,7 @@ class Renderer:
         self._time: float | None = None
         self._frames = 0
         self._drawn: CameraState | None = None
+        self._eye = EyeMediumFinder()
         self._runner: PlanRunner | None = None
         self._declared: _Declared | None = None
         self._previous: tuple[CameraState, dict[str, Any]] | None = None
@@ -456,7 +462,11 @@ class Renderer:
         view = self.scene.view_at(time)
         camera = CameraState.make(view, self.size, self._setup.scene_bounds_ws, jitter_px, boxes)
         before, transforms = self._previous or (camera, {})
-        return FrameState(time, camera, before, self._gpu, self._exposure(), transforms, self._frames, self._drawn)
+        instances = [item.instance for item in self._gpu.items]
+        medium = self._eye.find(instances, boxes, view.position_ws, self._gpu.version)
+        return FrameState(
+            time, camera, before, self._gpu, self._exposure(), transforms, self._frames, medium, self._drawn
+        )
 
     def _exposure(self) -> float:
         """The scene's exposure, or one that shows a white surface in full light a stop above middle grey's."""

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glcaustics.passes.geometry import DrawItem
-from glcaustics.scene.model import FloatArray, OpticalKind
+from glcaustics.scene.model import FloatArray, Instance, OpticalKind
 
 _TILT = 0.45  # tangent of the angle between the sheet's mean normal and the four further rays
 _WAYS = ((0.236, 0.917, 0.322), (-0.871, 0.133, 0.473), (0.411, -0.377, -0.830))  # no axis of anything
@@ -49,54 +48,63 @@ class EyeMediumFinder:
         self._key: tuple[int, bytes] | None = None
         self._found: EyeMedium | None = None
 
-    def find(self, items: Sequence[DrawItem], eye_ws: FloatArray, version: int) -> EyeMedium | None:
-        """The medium around `eye_ws` (3,), metres, world space; None: air. `version`: changes when the scene moves."""
+    def find(
+        self, instances: Sequence[Instance], boxes_ws: FloatArray, eye_ws: FloatArray, version: int = 0
+    ) -> EyeMedium | None:
+        """The medium around the eye; None: air.
+
+        Args:
+            instances: in the order of the object table. boxes_ws: (N, 2, 3) of each, metres.
+            eye_ws: (3,), metres. version: changes when the scene moves.
+        """
         key = (version, np.asarray(eye_ws, np.float64).tobytes())
         if key != self._key:
-            self._key, self._found = key, self._search(items, np.asarray(eye_ws, np.float64))
+            self._key, self._found = key, self._search(instances, boxes_ws, np.asarray(eye_ws, np.float64))
         return self._found
 
-    def _search(self, items: Sequence[DrawItem], eye_ws: FloatArray) -> EyeMedium | None:
-        solids = [item for item in items if item.kind is OpticalKind.SOLID and holds(item, eye_ws)]
-        if solids:
-            item = min(solids, key=lambda i: float(np.prod(np.ptp(i.bounds_ws, axis=0))))
-            return _medium(item, solid=item.index)
-        found = [
-            (distance, item)
-            for item in items
-            if item.kind is OpticalKind.INTERFACE and (distance := self._below(item, eye_ws)) is not None
-        ]
-        return _medium(min(found, key=lambda pair: pair[0])[1]) if found else None
+    def _search(self, instances: Sequence[Instance], boxes_ws: FloatArray, eye_ws: FloatArray) -> EyeMedium | None:
+        around: list[tuple[float, EyeMedium]] = []
+        above: list[tuple[float, EyeMedium]] = []
+        for index, (instance, box_ws) in enumerate(zip(instances, boxes_ws, strict=True)):
+            kind = instance.optical_kind
+            if kind is OpticalKind.SOLID and holds(instance, box_ws, eye_ws):
+                around.append((float(np.prod(np.ptp(box_ws, axis=0))), _medium(instance, solid=index)))
+            elif kind is OpticalKind.INTERFACE:
+                distance_m = self._below(instance, box_ws, eye_ws)
+                if distance_m is not None:
+                    above.append((distance_m, _medium(instance)))
+        nearest = min(around or above, key=lambda pair: pair[0], default=None)
+        return nearest[1] if nearest else None
 
-    def _below(self, item: DrawItem, eye_ws: FloatArray) -> float | None:
+    def _below(self, sheet: Instance, box_ws: FloatArray, eye_ws: FloatArray) -> float | None:
         """Metres from the eye to the sheet above it, by its mean normal; None when the eye is not below it."""
-        normal = self._normals.get(item.instance.name)
+        normal = self._normals.get(sheet.name)
         if normal is None:
-            normal = self._normals[item.instance.name] = mean_normal(item)
-        highest = np.where(normal > 0.0, item.bounds_ws[1], item.bounds_ws[0]) @ normal
+            normal = self._normals[sheet.name] = mean_normal(sheet)
+        highest = np.where(normal > 0.0, box_ws[1], box_ws[0]) @ normal
         if not normal.any() or float(eye_ws @ normal) >= float(highest):
             return None
-        straight = first_crossing(item, eye_ws, normal)
+        straight = first_crossing(sheet, eye_ws, normal)
         if straight is not None:
             return straight[0] if straight[1] else None
         side = _perpendicular(normal)
         sides = (side, -side, np.cross(normal, side), -np.cross(normal, side))
-        tilted = [first_crossing(item, eye_ws, normal + _TILT * s) for s in sides]
+        tilted = [first_crossing(sheet, eye_ws, normal + _TILT * s) for s in sides]
         through_back = [hit[0] for hit in tilted if hit is not None and hit[1]]
         return min(through_back) if len(through_back) >= _TILTED_HITS else None
 
 
-def _medium(item: DrawItem, solid: int = -1) -> EyeMedium:
-    material = item.instance.material
-    return EyeMedium(item.instance.name, np.asarray(material.sigma_a, np.float64), float(material.ior), solid)
+def _medium(instance: Instance, solid: int = -1) -> EyeMedium:
+    material = instance.material
+    return EyeMedium(instance.name, np.asarray(material.sigma_a, np.float64), float(material.ior), solid)
 
 
-def mean_normal(item: DrawItem) -> FloatArray:
-    """Direction (3,) of the vertices' mean normal, unit length; zero where the normals cancel."""
-    normal = np.asarray(item.normal_from_object @ item.instance.mesh.normals.mean(axis=0, dtype=np.float64))
+def mean_normal(instance: Instance) -> FloatArray:
+    """Direction (3,) of the vertices' mean normal, unit length, world space; zero where the normals cancel."""
+    linear = np.linalg.inv(instance.world_from_object[:3, :3]).T
+    normal = np.asarray(linear @ instance.mesh.normals.mean(axis=0, dtype=np.float64))
     length = float(np.linalg.norm(normal))
-    scale = float(np.linalg.norm(item.normal_from_object))
-    return np.asarray(normal / length) if length > 1e-3 * scale else np.zeros(3)
+    return np.asarray(normal / length) if length > 1e-3 * float(np.linalg.norm(linear)) else np.zeros(3)
 
 
 def _perpendicular(n: FloatArray) -> FloatArray:
@@ -104,16 +112,16 @@ def _perpendicular(n: FloatArray) -> FloatArray:
     return np.asarray(side / np.linalg.norm(side))
 
 
-def first_crossing(item: DrawItem, origin_ws: FloatArray, direction_ws: FloatArray) -> tuple[float, bool] | None:
+def first_crossing(instance: Instance, origin_ws: FloatArray, direction_ws: FloatArray) -> tuple[float, bool] | None:
     """The first triangle of an instance that a ray crosses; edges belong to both their triangles.
 
     Returns:
         Distance in lengths of `direction_ws`, and whether it is crossed from its back (the ray goes along the normal
         that the winding gives). None without a crossing.
     """
-    inverse = np.linalg.inv(item.world_from_object)
+    inverse = np.linalg.inv(instance.world_from_object)
     origin, direction = inverse[:3, :3] @ origin_ws + inverse[:3, 3], inverse[:3, :3] @ direction_ws
-    points, triangles = item.instance.mesh.positions_m, item.instance.mesh.triangles
+    points, triangles = instance.mesh.positions_m, instance.mesh.triangles
     u = _perpendicular(direction)
     uv = np.stack((u, np.cross(direction, u) / np.linalg.norm(direction)), 1)
     # Seen along the ray: only a triangle with corners on both sides of the origin, in u and in v, can be crossed.
@@ -141,13 +149,13 @@ def _cross2(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
-def holds(item: DrawItem, point_ws: FloatArray) -> bool:
+def holds(instance: Instance, box_ws: FloatArray, point_ws: FloatArray) -> bool:
     """Whether a watertight mesh encloses a point (3,): from there, the first surface on a way out is met from its back.
 
     Two of three rays decide, should one run along an edge. A mesh wound inside out holds nothing.
     """
-    low, high = item.bounds_ws
-    if not item.instance.mesh.watertight or (point_ws <= low).any() or (point_ws >= high).any():
+    low, high = box_ws
+    if not instance.mesh.watertight or (point_ws <= low).any() or (point_ws >= high).any():
         return False
-    hits = (first_crossing(item, point_ws, np.asarray(way)) for way in _WAYS)
+    hits = (first_crossing(instance, point_ws, np.asarray(way)) for way in _WAYS)
     return sum(hit is not None and hit[1] for hit in hits) >= 2

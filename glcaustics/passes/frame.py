@@ -12,6 +12,7 @@ import numpy as np
 from glcaustics.errors import GraphError
 from glcaustics.gpu import Device
 from glcaustics.graph import Step, check_history, check_read, check_write
+from glcaustics.passes.eye_medium import EyeMedium
 from glcaustics.passes.geometry import SPECULAR_KINDS, GpuScene, boxes_of, points_of
 from glcaustics.passes.light_views import LightView, fit_view, orthographic, perspective, unit
 from glcaustics.scene.model import Camera, FloatArray, Instance, IntArray, Light, LightKind, OpticalKind, Scene
@@ -368,6 +369,7 @@ class FrameState:
     exposure: float
     previous_transforms: Mapping[str, FloatArray] = field(default_factory=dict)
     index: int = 0  # frames and shifted samples drawn before this one
+    eye_medium: EyeMedium | None = None  # the water or glass that the eye is in; None: air
     history_camera: CameraState | None = None  # of the last picture drawn, shifted or not: what histories were seen by
 
     def uniforms(self) -> dict[str, Any]:

@@ -93,7 +93,7 @@ def _draw_second(ctx: PassContext) -> None:
 def _shows_fronts_only(item: DrawItem, eye_ws: FloatArray) -> bool:
     """Whether an eye there can see no back face: of a closed mesh, from outside. Not where mirroring swaps them."""
     closed = item.instance.mesh.watertight and float(np.linalg.det(item.world_from_object[:3, :3])) > 0.0
-    return closed and not holds(item, eye_ws)
+    return closed and not holds(item.instance, item.bounds_ws, eye_ws)
 
 
 def declare_specular(graph: FrameGraph, setup: FrameSetup) -> None:
