@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from glcaustics.scene.model import Camera, FloatArray, Scene
+
+SCENES = ("pool", "glass-statue", "boat", "lagoon")  # those that play the parts of Mayer 2026, and one more
 ITERATIONS = tuple(range(8))  # 0: the solver's start alone; as the graphs of Mayer 2026, table 2
 
 
@@ -29,3 +33,32 @@ def pooled(rows: Sequence[Mapping[str, Any]], weights: Sequence[float]) -> dict[
             mean = np.asarray(weights, np.float64) @ np.asarray(values, np.float64) / total
             found[name] = float(mean) if np.ndim(mean) == 0 else tuple(float(v) for v in mean)
     return found
+
+
+def seeded_cameras(scene: Scene, count: int, seed: int = 0) -> list[Camera]:
+    """The scene's own camera, then its orbits around the point that it looks at; every third one grazing."""
+    rng = np.random.default_rng(seed)
+    base = scene.view_at(0.0)
+    m = np.asarray(base.world_from_camera, np.float64)
+    eye, forward = m[:3, 3], -m[:3, 2]
+    target = eye + forward * (eye[1] / max(-forward[1], 0.2)) * 0.9
+    radius = float(np.linalg.norm(eye - target))
+    cameras = [base]
+    for index in range(1, count):
+        azimuth = rng.uniform(0.0, 2.0 * np.pi)
+        elevation = np.radians(rng.uniform(12.0, 20.0) if index % 3 == 2 else rng.uniform(30.0, 75.0))
+        offset = np.array([np.cos(azimuth) * np.cos(elevation), np.sin(elevation), np.sin(azimuth) * np.cos(elevation)])
+        cameras.append(
+            replace(base, world_from_camera=look_at(target + radius * rng.uniform(0.6, 1.1) * offset, target))
+        )
+    return cameras
+
+
+def look_at(eye: FloatArray, target: FloatArray) -> FloatArray:
+    """(4, 4) world_from_camera of a camera at `eye` that looks at `target`, world +y up; metres."""
+    back = (eye - target) / np.linalg.norm(eye - target)
+    right = np.cross([0.0, 1.0, 0.0], back)
+    right /= np.linalg.norm(right)
+    m = np.eye(4)
+    m[:3, 0], m[:3, 1], m[:3, 2], m[:3, 3] = right, np.cross(back, right), back, eye
+    return m

@@ -5,21 +5,23 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from glcaustics.bench.convergence import ITERATIONS, pooled
+from glcaustics.bench.convergence import ITERATIONS, SCENES, look_at, pooled, seeded_cameras
+from glcaustics.bench.eye_truth import EyeTruth, eye_truth, has_open_surface
 from glcaustics.errors import UsageError
 from glcaustics.renderer import Renderer
 from glcaustics.scene.load import load_scene
 from glcaustics.scene.model import Camera, FloatArray, Scene
 
+__all__ = ["PUBLISHED", "SCENES", "EyeConvergence", "eye_convergence", "eye_study", "look_at", "main", "seeded_cameras"]
+
 SOLVED_BY_NEWTON, SOLVED_BY_MARCHING = 1, 5  # of `solve_status`
-SCENES = ("pool", "glass-statue", "boat", "lagoon")
 _AOVS = ("solve_status", "solve_hit")
 _STEPS = {"refraction_steps": 16384, "reflection_steps": 1}  # refracted rays are judged; reflections only cost
 
@@ -57,35 +59,6 @@ class EyeConvergence:
     def weight(self) -> float:
         """Number of resolvable pixels: what pooled shares are weighed by."""
         return self.pixels * self.resolvable
-
-
-def seeded_cameras(scene: Scene, count: int, seed: int = 0) -> list[Camera]:
-    """The scene's own camera, then its orbits around the point that it looks at; every third one grazing."""
-    rng = np.random.default_rng(seed)
-    base = scene.view_at(0.0)
-    m = np.asarray(base.world_from_camera, np.float64)
-    eye, forward = m[:3, 3], -m[:3, 2]
-    target = eye + forward * (eye[1] / max(-forward[1], 0.2)) * 0.9
-    radius = float(np.linalg.norm(eye - target))
-    cameras = [base]
-    for index in range(1, count):
-        azimuth = rng.uniform(0.0, 2.0 * np.pi)
-        elevation = np.radians(rng.uniform(12.0, 20.0) if index % 3 == 2 else rng.uniform(30.0, 75.0))
-        offset = np.array([np.cos(azimuth) * np.cos(elevation), np.sin(elevation), np.sin(azimuth) * np.cos(elevation)])
-        cameras.append(
-            replace(base, world_from_camera=look_at(target + radius * rng.uniform(0.6, 1.1) * offset, target))
-        )
-    return cameras
-
-
-def look_at(eye: FloatArray, target: FloatArray) -> FloatArray:
-    """(4, 4) world_from_camera of a camera at `eye` that looks at `target`, world +y up; metres."""
-    back = (eye - target) / np.linalg.norm(eye - target)
-    right = np.cross([0.0, 1.0, 0.0], back)
-    right /= np.linalg.norm(right)
-    m = np.eye(4)
-    m[:3, 0], m[:3, 1], m[:3, 2], m[:3, 3] = right, np.cross(back, right), back, eye
-    return m
 
 
 Solved = tuple[FloatArray, FloatArray]  # status (H, W), hit in pixels (H, W, 2)
@@ -170,17 +143,13 @@ def eye_study(
 
     Returns:
         `size`, `views`, `seed`, `iterations`, `seconds`, `published` (see PUBLISHED) and `scenes`: for each `scene`,
-        `seconds`, `pooled` (shares over the resolvable pixels of all views) and `views` (EyeConvergence each).
+        `seconds`, `pooled` (shares over the resolvable pixels of all views), `views` (EyeConvergence each) and
+        `by_ray_casting`: `pooled` and `views` of EyeTruth, None where no open surface refracts.
     """
     begin, rows = time.perf_counter(), []
     for name in scenes:
         report(f"{name}: eye rays")
-        start, scene = time.perf_counter(), load_scene(name)
-        found = eye_convergence(scene, seeded_cameras(scene, views, seed), size, iterations, **renderer)
-        each = [asdict(view) for view in found]
-        together = pooled(each, [view.weight for view in found])
-        together["resolvable"] = sum(view.weight for view in found) / together["pixels"]
-        rows.append({"scene": scene.name, "seconds": time.perf_counter() - start, "pooled": together, "views": each})
+        rows.append(_study_scene(load_scene(name), views, size, iterations, seed, renderer))
     return {
         "size": list(size),
         "views": views,
@@ -190,6 +159,30 @@ def eye_study(
         "published": PUBLISHED,
         "scenes": rows,
     }
+
+
+def _study_scene(
+    scene: Scene,
+    views: int,
+    size: tuple[int, int],
+    iterations: Sequence[int],
+    seed: int,
+    renderer: Mapping[str, Any],
+) -> dict[str, Any]:
+    start, cameras = time.perf_counter(), seeded_cameras(scene, views, seed)
+    row = {"scene": scene.name, **_both(eye_convergence(scene, cameras, size, iterations, **renderer))}
+    truth = []
+    if has_open_surface(scene):
+        truth = eye_truth(scene, cameras, size, iterations, str(renderer.get("backend", "auto")))
+    return {**row, "by_ray_casting": _both(truth) if truth else None, "seconds": time.perf_counter() - start}
+
+
+def _both(found: Sequence[EyeConvergence] | Sequence[EyeTruth]) -> dict[str, Any]:
+    """`views` and `pooled`."""
+    each = [asdict(view) for view in found]
+    together = pooled(each, [view.weight for view in found])
+    together["resolvable"] = sum(view.weight for view in found) / max(together["pixels"], 1)
+    return {"pooled": together, "views": each}
 
 
 def _print_row(label: str, row: dict[str, Any]) -> None:
@@ -232,6 +225,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
             for index, view in enumerate(row["views"]):
                 _print_row(f"{row['scene']}, view {index}", view)
             _print_row(f"{row['scene']}, pooled ({row['seconds']:.0f} s)", row["pooled"])
+            if row["by_ray_casting"]:
+                true = row["by_ray_casting"]["pooled"]
+                shares = " ".join(f"{share:.4f}" for share in true["within_1px"])
+                print(f"  by float64 ray casting: {true['resolvable']:.3f} resolvable; {shares}; dda {true['dda']:.4f}")
         if chosen.json:
             with open(chosen.json, "w", encoding="utf-8") as file:
                 json.dump(found, file, indent=1)

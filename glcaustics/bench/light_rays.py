@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from glcaustics.bench.convergence import ITERATIONS, pooled
-from glcaustics.bench.eye_rays import SCENES
+from glcaustics.bench.convergence import ITERATIONS, SCENES, pooled
 from glcaustics.bench.light_solver import LightSolver
 from glcaustics.bench.scene_export import beam_mesh
 from glcaustics.caustics.branches import SOLID, Branch
@@ -99,18 +98,13 @@ def _texel_width_m(view: LightView, points: FloatArray) -> FloatArray:
 def _visible(
     view: LightView, stored: FloatArray, points: FloatArray, normals: FloatArray, ray: FloatArray
 ) -> BoolArray:
-    """Whether the view stores the surface of each point, in its texel or one beside it, and sees the side that the
-    light arrives at."""
+    """Whether the view stores the surface of each point in its texel, and sees the side that the light arrives at."""
     height, width = stored.shape[:2]
     px, texel_m = _project(view, points), _texel_width_m(view, points)
     inside = np.all((px >= 0.0) & (px < (width, height)), axis=1)
-    x, y = np.clip(px[:, 0].astype(int), 1, width - 2), np.clip(px[:, 1].astype(int), 1, height - 2)
-    found = np.zeros(len(points), bool)
-    for dx in (-1, 0, 1):
-        for dy in (-1, 0, 1):
-            there = stored[y + dy, x + dx]
-            gap = np.abs(np.einsum("ij,ij->i", there[:, :3] - points, normals))
-            found |= (there[:, 3] > 0.0) & (gap < ON_SURFACE * texel_m)
+    x, y = np.clip(px[:, 0].astype(int), 0, width - 1), np.clip(px[:, 1].astype(int), 0, height - 1)
+    gap = np.abs(np.einsum("ij,ij->i", stored[y, x, :3] - points, normals))
+    found = (stored[y, x, 3] > 0.0) & (gap < ON_SURFACE * texel_m)
     light = np.asarray(view.light.direction_ws, np.float64)
     if view.light.kind is not LightKind.DIRECTIONAL:
         light = points - np.asarray(view.light.position_ws)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from glcaustics.bench.eye_rays import seeded_cameras
+from glcaustics.bench.convergence import seeded_cameras
 from glcaustics.gpu import Device, create_device
 from glcaustics.graph import FrameGraph
 from glcaustics.optics.refract import refract

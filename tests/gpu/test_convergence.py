@@ -10,6 +10,7 @@ import pytest
 import glcaustics as glc
 from glcaustics.bench.convergence import pooled
 from glcaustics.bench.eye_rays import PUBLISHED, eye_convergence, eye_study
+from glcaustics.bench.eye_truth import eye_truth
 from glcaustics.bench.light_rays import LightConvergence, light_convergence, light_study, seeded_lights
 from glcaustics.bench.light_solver import LightSolver
 from glcaustics.errors import UsageError
@@ -64,6 +65,15 @@ def test_eye_rays_behind_an_edge_are_not_solved_by_newton() -> None:
     assert found.within_1px[0] < found.within_1px[1] < found.within_1px[2]
 
 
+def test_eye_rays_agree_with_float64_ray_casting() -> None:
+    """A floor and a stone under waves: Newton and the DDA meet what the triangles have there; the start does not."""
+    scene = over_a_floor(waves(0.05), box("stone", (0.5, 0.3, 0.5), (0.2, -0.85, 0.1)))
+    [found] = eye_truth(scene, [ABOVE], (160, 90), (0, 1, 4), BACKEND)
+    assert 0.7 < found.resolvable < 0.999, "what the stone hides from the eye is not resolvable"
+    assert found.within_1px[0] < 0.2 < found.within_1px[1] < found.within_1px[2]
+    assert found.within_1px[2] > 0.98 and found.dda > 0.98
+
+
 def light_rays(scene: Scene, iterations: tuple[int, ...] = (0, 1, 2, 4)) -> LightConvergence:
     device = create_device(BACKEND)
     try:
@@ -93,6 +103,7 @@ def test_studies_are_ready_for_json() -> None:
     light = light_study(["peer-pool"], 2, (0, 1, 3), quality="draft", backend=BACKEND)
     assert json.loads(json.dumps(eye))["scenes"][0]["scene"] == "peer-pool" and eye["published"] == PUBLISHED
     assert json.loads(json.dumps(light))["scenes"][0]["branch"] == "interface"
+    assert eye["scenes"][0]["by_ray_casting"]["pooled"]["within_1px"][2] > 0.98
     for study, name in ((eye, "within_1px"), (light, "within_1texel")):
         [row] = study["scenes"]
         assert len(row["views"]) == 2

@@ -1,0 +1,134 @@
+"""Eye rays behind open surfaces against float64 ray casting of the scene's triangles: how true the solvers are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from glcaustics.bench.convergence import ITERATIONS
+from glcaustics.bench.scene_export import beam_mesh
+from glcaustics.bench.solver_variants import Buffers, VariantBench, ray_from_px, scene_buffers
+from glcaustics.gpu import create_device
+from glcaustics.optics.beam_scene import BeamScene
+from glcaustics.optics.raycast import RayCaster
+from glcaustics.scene.model import Camera, OpticalKind, Scene
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+ON_SURFACE = 0.5  # pixels between a visible point and the plane of what the camera sees there
+MANY = 16384  # steps of the pixel-exact march
+
+
+@dataclass(frozen=True)
+class EyeTruth:
+    """Shares of the resolvable pixels of one view; resolvable = the camera sees what float64 ray casting hits.
+
+    `pixels`: refracted rays; `resolvable`: of them, the share; `within_1px[k]`: Newton's estimate after
+    `iterations[k]` look-ups lies within one pixel (max norm) of the truth; `dda`: that of pixel-exact marching.
+    """
+
+    pixels: int
+    resolvable: float
+    iterations: tuple[int, ...]
+    within_1px: tuple[float, ...]
+    dda: float
+
+    @property
+    def weight(self) -> float:
+        """Number of resolvable pixels."""
+        return self.pixels * self.resolvable
+
+
+def has_open_surface(scene: Scene) -> bool:
+    """Whether there is a surface of one interface, such as water; the way through solids is judged elsewhere."""
+    return any(i.optical_kind is OpticalKind.INTERFACE for i in scene.instances_at(0.0))
+
+
+def eye_truth(
+    scene: Scene,
+    cameras: Sequence[Camera],
+    size: tuple[int, int] = (1280, 720),
+    iterations: Sequence[int] = ITERATIONS,
+    backend: str = "auto",
+) -> list[EyeTruth]:
+    """One result a view that resolves anything, at time 0.
+
+    Raises:
+        UsageError: embreex is not installed.
+    """
+    meshes = tuple(beam_mesh(i) for i in scene.instances_at(0.0) if i.optical_kind is OpticalKind.DIFFUSE)
+    caster = RayCaster(BeamScene(meshes, ()))
+    found = []
+    with create_device(backend) as device:
+        for camera in cameras:
+            buffers = scene_buffers(device, scene, camera, size)
+            exact, resolvable = ray_truth(caster, buffers)
+            if not resolvable.any():
+                continue
+            bench = VariantBench(device, buffers)
+
+            def near(variant: str, count: int, bench: Any = bench, at: Any = resolvable, exact: Any = exact) -> float:
+                off = np.abs(bench.solve(variant, count)[at][:, :2] - exact[at]).max(axis=-1)
+                return float((off <= 1.0).mean())
+
+            rays = int((buffers.ray[..., 3] > 0.0).sum())
+            shares = tuple(near("planes", count) for count in iterations)
+            found.append(EyeTruth(rays, float(resolvable.sum()) / rays, tuple(iterations), shares, near("dda", MANY)))
+            bench.release()
+    return found
+
+
+def ray_truth(caster: RayCaster, buffers: Buffers) -> tuple[FloatArray, BoolArray]:
+    """Pixel coordinates (H, W, 2) of what each ray hits first, and the mask (H, W) where the camera sees that."""
+    tried = buffers.ray[..., 3] > 0.0
+    direction = np.asarray(buffers.ray[tried][:, :3], np.float64)
+    hits = caster.first_hits(np.asarray(buffers.origin_ws[tried], np.float64), direction)
+    camera, size = buffers.camera, buffers.size
+    px, depth = _project(buffers, hits.point_ws)
+    inside = (hits.object_id >= 0) & (depth > 0.0) & np.all((px >= 0.0) & (px < np.asarray(size)), axis=1)
+    eye_ray = np.concatenate([px, np.ones_like(px[:, :1])], axis=1) @ ray_from_px(camera, size).T
+    sees = np.einsum("ij,ij->i", hits.geometric_ws, eye_ray if not camera.orthographic else -_back(camera, px))
+    meets = np.einsum("ij,ij->i", hits.geometric_ws, direction)
+    seen = inside & (sees * meets > 0.0) & _stored(buffers, hits.point_ws, hits.geometric_ws, px, depth)
+    exact = np.zeros((*tried.shape, 2))
+    exact[tried] = px
+    resolvable = np.zeros(tried.shape, bool)
+    resolvable[tried] = seen
+    return exact, resolvable
+
+
+def _back(camera: Any, like: FloatArray) -> FloatArray:
+    """The view's backward axis, once a row of `like`."""
+    return np.broadcast_to(camera.world_from_camera[:3, 2], (len(like), 3))
+
+
+def _project(buffers: Buffers, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n, 2) pixel coordinates and (n,) depth along the view axis of world points (n, 3)."""
+    view = np.concatenate([points, np.ones_like(points[:, :1])], axis=1) @ buffers.camera.camera_from_world.T
+    depth = np.asarray(-view[:, 2], np.float64)
+    scale = np.ones_like(depth) if buffers.camera.orthographic else np.where(depth > 0.0, depth, 1.0)
+    ndc = np.asarray(view[:, :2] / scale[:, None] / np.asarray(buffers.camera.lens[:2]), np.float64)
+    return (ndc * 0.5 + 0.5 + np.asarray(buffers.camera.jitter_uv)) * np.asarray(buffers.size), depth
+
+
+def _stored(buffers: Buffers, points: FloatArray, normals: FloatArray, px: FloatArray, depth: FloatArray) -> BoolArray:
+    """Whether the texel of each point holds the point's surface: on its plane to half a pixel."""
+    width, height = buffers.size
+    camera = buffers.camera
+    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    grid = np.stack([x, y, np.ones_like(x)], axis=-1)
+    matrix = ray_from_px(camera, buffers.size)
+    if camera.orthographic:
+        centre = grid * [1.0, 1.0, 0.0] - [0.5 * width, 0.5 * height, 0.0]
+        stored = camera.world_from_camera[:3, 3] + centre @ matrix.T + buffers.depth_m[..., None] * matrix[:, 2]
+    else:
+        stored = camera.world_from_camera[:3, 3] + (grid @ matrix.T) * buffers.depth_m[..., None]
+    pixel_m = 2.0 * camera.lens[1] / height * (np.ones_like(depth) if camera.orthographic else depth)
+    column = np.clip(np.nan_to_num(px[:, 0]).astype(int), 0, width - 1)
+    row = np.clip(np.nan_to_num(px[:, 1]).astype(int), 0, height - 1)
+    gap = np.abs(np.einsum("ij,ij->i", stored[row, column] - points, normals))
+    return np.asarray((buffers.depth_m[row, column] > 0.0) & (gap < ON_SURFACE * pixel_m))
