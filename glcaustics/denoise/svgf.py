@@ -1,33 +1,70 @@
 """Spatiotemporal variance-guided filtering (Schied et al. 2017) of irradiance at the camera's pixels.
 
-Beyond the paper: histories in 32-bit floats; a history that is dropped where the new frame contradicts it by more than
-its noise, in the mean or in the pattern (after Schied, Peters, Dachsbacher 2018, but without re-shaded samples); an
-a-trous filter in conservative form, so that the sum over the picture stays what it was, however sparse and bright the
-samples are.
+Knows nothing of the method whose noise it takes: see `declare`, and docs/methods/svgf.md. Beyond the paper: histories
+in 32-bit floats, resampled by cubics; mixed with the new frame by what the light's change and the noise make of them
+(after Schied, Peters, Dachsbacher 2018, but without re-shaded samples); a noise estimate that does not take the
+caustic itself for noise; an a-trous filter in conservative form, so that the sum over the picture stays what it was,
+however sparse and bright the samples are.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
+from glcaustics.errors import UsageError
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes.frame import FrameSetup, PassContext
 
 SHADERS = "denoise/svgf"
 COLOR, MOMENTS = "svgf.color", "svgf.moments"  # both histories: mean and its length in frames; luminance and its square
-REPROJECTED, REPROJECTED_MOMENTS, BLOCKS = "svgf.reprojected", "svgf.reprojected_moments", "svgf.blocks"
-ESTIMATE = "svgf.estimate"
+REPROJECTED, REPROJECTED_MOMENTS = "svgf.reprojected", "svgf.reprojected_moments"
+DIFFERENCE, NOISE, CHANGE = "svgf.difference", "svgf.noise", "svgf.change"
+ESTIMATE, GUIDE = "svgf.estimate", "svgf.guide"
 DEPTH, NORMAL, MOTION = "gbuffer.depth_m", "gbuffer.normal_ws", "gbuffer.motion"
 BLOCK = 4  # pixels
 
+DEFAULTS: Mapping[str, Any] = {"denoise_passes": 5, "history_frames": 64, "denoise_history": "adaptive"}
+RANGES: Mapping[str, tuple[int, int]] = {"denoise_passes": (1, 8), "history_frames": (1, 1024)}
+HISTORIES = ("adaptive", "exponential")
+OPTION_HELP: Mapping[str, str] = {
+    "denoise_passes": "a-trous passes of the filter (1..8)",
+    "history_frames": "longest memory of the filter (1..1024)",
+    "denoise_history": "adaptive: shortened where the light changes; exponential: alpha 0.2, bilinear, as in the "
+    "paper: a baseline",
+}
+EXPONENTIAL_FRAMES = 5  # 1 / alpha (Schied et al. 2017, sec. 5)
+
+
+def check_options(options: Mapping[str, Any]) -> None:
+    """Raise UsageError for an option of the filter that is out of its range."""
+    for name, (low, high) in RANGES.items():
+        value = options[name]
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise UsageError(
+                f"option {name} is {value!r}", where="denoise", remedy=f"give a whole number from {low} to {high}"
+            )
+    if options["denoise_history"] not in HISTORIES:
+        raise UsageError(
+            f"option denoise_history is {options['denoise_history']!r}",
+            where="denoise",
+            remedy=f"use one of {', '.join(HISTORIES)}",
+        )
+
 
 def declare(graph: FrameGraph, setup: FrameSetup, noisy: str, clean: str, desc: TextureDesc) -> None:
-    """Add the passes that turn `noisy` into `clean` (rgba32f irradiance at the camera's pixels).
+    """Add the passes that turn `noisy` into `clean`.
 
-    Options: `denoise_passes`, `history_frames`.
+    Args:
+        setup: its options hold those of `OPTION_HELP`.
+        noisy: resource, rgba32f: an unbiased estimate in rgb at the camera's opaque pixels, with noise that is
+            independent from frame to frame; alpha is not looked at.
+        clean: resource to write. desc: of both.
+
+    Of the frame it reads depth, normal and motion of the G-buffer, and its own last results.
     """
+    adaptive = setup.options["denoise_history"] == "adaptive"
     size = setup.size
-    blocks = (-(-size[0] // BLOCK), -(-size[1] // BLOCK))
     color, pair = TextureDesc("rgba32f", size, desc.unit), TextureDesc("rg32f", size)
     graph.add(
         PassDecl(
@@ -40,28 +77,23 @@ def declare(graph: FrameGraph, setup: FrameSetup, noisy: str, clean: str, desc: 
             view_dependent=True,
         )
     )
-    graph.add(
-        PassDecl(
-            "svgf.blocks",
-            {BLOCKS: TextureDesc("rgba32f", blocks)},
-            lambda ctx: _blocks(ctx, noisy),
-            reads=(noisy, REPROJECTED, REPROJECTED_MOMENTS),
-            note="where the new frame contradicts the last one",
-        )
-    )
+    if adaptive:
+        _declare_change(graph, size, noisy)
+    else:
+        graph.leave_out("svgf.change", "the history is a plain exponential mean")
     graph.add(
         PassDecl(
             "svgf.accumulate",
             {COLOR: color, MOMENTS: pair},
             lambda ctx: _accumulate(ctx, noisy),
-            reads=(noisy, REPROJECTED, REPROJECTED_MOMENTS, BLOCKS),
+            reads=(noisy, REPROJECTED, REPROJECTED_MOMENTS, *((CHANGE,) if adaptive else ())),
             note="mean over the frames",
         )
     )
     graph.add(
         PassDecl(
             "svgf.variance",
-            {ESTIMATE: color},
+            {ESTIMATE: color, GUIDE: TextureDesc("r32f", size)},
             _variance,
             reads=(COLOR, MOMENTS, DEPTH, NORMAL),
             note="how far that mean may be off",
@@ -75,13 +107,35 @@ def declare(graph: FrameGraph, setup: FrameSetup, noisy: str, clean: str, desc: 
         source = target
 
 
+def _declare_change(graph: FrameGraph, size: tuple[int, int], noisy: str) -> None:
+    blocks = (-(-size[0] // BLOCK), -(-size[1] // BLOCK))
+    graph.add(
+        PassDecl(
+            "svgf.blocks",
+            {DIFFERENCE: TextureDesc("rgba32f", blocks), NOISE: TextureDesc("rgba32f", blocks)},
+            lambda ctx: _blocks(ctx, noisy),
+            reads=(noisy, REPROJECTED, REPROJECTED_MOMENTS),
+            note="how the new frame differs from the last ones",
+        )
+    )
+    graph.add(
+        PassDecl(
+            "svgf.change",
+            {CHANGE: TextureDesc("r32f", blocks, filter="linear")},
+            _change,
+            reads=(DIFFERENCE, NOISE),
+            note="by how much that is more than noise",
+        )
+    )
+
+
 def _declare_atrous(graph: FrameGraph, index: int, source: str, target: str, desc: TextureDesc) -> None:
     graph.add(
         PassDecl(
             f"svgf.atrous_{index}",
             {target: desc},
             lambda ctx: _atrous(ctx, source, target, 1 << index),
-            reads=(source, DEPTH, NORMAL),
+            reads=(source, DEPTH, NORMAL, *((GUIDE,) if source == ESTIMATE else ())),
             note=f"a-trous filter, step {1 << index} px",
         )
     )
@@ -113,7 +167,8 @@ def _reproject(ctx: PassContext) -> None:
         "u_previous_jitter": before.jitter_uv,
         "u_history_shift": shift,
     }
-    _draw(ctx, "reproject", (REPROJECTED, REPROJECTED_MOMENTS), values)
+    cubic = int(ctx.setup.options["denoise_history"] == "adaptive")
+    _draw(ctx, "reproject", (REPROJECTED, REPROJECTED_MOMENTS), values, CUBIC=cubic)
 
 
 def _blocks(ctx: PassContext, noisy: str) -> None:
@@ -122,24 +177,33 @@ def _blocks(ctx: PassContext, noisy: str) -> None:
         "t_reprojected": ctx.texture(REPROJECTED),
         "t_moments": ctx.texture(REPROJECTED_MOMENTS),
     }
-    _draw(ctx, "blocks", (BLOCKS,), values, BLOCK=BLOCK)
+    _draw(ctx, "blocks", (DIFFERENCE, NOISE), values, BLOCK=BLOCK)
+
+
+def _change(ctx: PassContext) -> None:
+    _draw(ctx, "change", (CHANGE,), {"t_difference": ctx.texture(DIFFERENCE), "t_noise": ctx.texture(NOISE)})
 
 
 def _accumulate(ctx: PassContext, noisy: str) -> None:
+    adaptive = ctx.setup.options["denoise_history"] == "adaptive"
     values = {
         "t_noisy": ctx.texture(noisy),
         "t_reprojected": ctx.texture(REPROJECTED),
         "t_moments": ctx.texture(REPROJECTED_MOMENTS),
-        "t_blocks": ctx.texture(BLOCKS),
-        "u_max_frames": float(ctx.setup.options["history_frames"]),
+        "u_max_frames": float(ctx.setup.options["history_frames"] if adaptive else EXPONENTIAL_FRAMES),
+        **({"t_change": ctx.texture(CHANGE)} if adaptive else {}),
     }
-    _draw(ctx, "accumulate", (COLOR, MOMENTS), values, BLOCK=BLOCK)
+    _draw(ctx, "accumulate", (COLOR, MOMENTS), values, BLOCK=BLOCK, ADAPTIVE=int(adaptive))
 
 
 def _variance(ctx: PassContext) -> None:
     values = {**_geometry(ctx), "t_color": ctx.texture(COLOR), "t_moments": ctx.texture(MOMENTS)}
-    _draw(ctx, "variance", (ESTIMATE,), values)
+    _draw(ctx, "variance", (ESTIMATE, GUIDE), values)
 
 
 def _atrous(ctx: PassContext, source: str, target: str, step: int) -> None:
-    _draw(ctx, "atrous", (target,), {**_geometry(ctx), "t_source": ctx.texture(source), "u_step": step})
+    values = {**_geometry(ctx), "t_source": ctx.texture(source), "u_step": step}
+    guided = source == ESTIMATE
+    if guided:
+        values["t_guide"] = ctx.texture(GUIDE)
+    _draw(ctx, "atrous", (target,), values, GUIDED=int(guided))

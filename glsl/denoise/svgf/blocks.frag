@@ -1,24 +1,46 @@
-// How the new frame differs from the history, over blocks of pixels: what the reaction to moving light is decided by.
+// How the new frame differs from the history, and what its noise alone would do, over blocks of pixels.
 #include "denoise/svgf/common.glsl"
 
 uniform sampler2D t_noisy;
 uniform sampler2D t_reprojected;
 uniform sampler2D t_moments;
 
-layout(location = 0) out vec4 o_block;  // sums over pixels with a history: difference, its square, expected square by noise alone, pixels
+layout(location = 0) out vec4 o_difference;  // over pixels with a history: sum of new - old, of its square, of 1 / frames, pixels
+layout(location = 1) out vec4 o_noise;       // variance of a pixel: seen in the new frame, in the history; over time: sum, pixels
+
+// The mixed difference of a quad of pixels knows nothing of what is constant or runs along one axis, but all of the noise.
+float rough(vec4 quad) {
+    float mixed = quad.x - quad.y - quad.z + quad.w;
+    return 0.25 * mixed * mixed;
+}
 
 void main() {
-    o_block = vec4(0.0);
-    ivec2 first = ivec2(gl_FragCoord.xy) * BLOCK, size = textureSize(t_noisy, 0);
-    for (int i = 0; i < BLOCK * BLOCK; ++i) {
-        ivec2 pixel = first + ivec2(i % BLOCK, i / BLOCK);
-        if (any(greaterThanEqual(pixel, size))) continue;
-        vec4 before = texelFetch(t_reprojected, pixel, 0);
-        vec4 noisy = texelFetch(t_noisy, pixel, 0);
-        if (before.w < 3.5 || !svgf_is_finite(noisy)) continue;   // no variance to speak of yet
-        vec2 moments = texelFetch(t_moments, pixel, 0).rg;
-        float difference = svgf_luminance(noisy.rgb) - svgf_luminance(before.rgb);
-        float variance = max(moments.y - moments.x * moments.x, 0.0) * before.w / (before.w - 1.0);
-        o_block += vec4(difference, difference * difference, variance * (1.0 + 1.0 / before.w), 1.0);
+    o_difference = vec4(0.0);
+    o_noise = vec4(0.0);
+    ivec2 first = ivec2(gl_FragCoord.xy) * BLOCK, last = textureSize(t_noisy, 0) - 1;
+    float quads = 0.0;
+    for (int i = 0; i < BLOCK * BLOCK / 4; ++i) {
+        ivec2 corner = first + 2 * ivec2(i % (BLOCK / 2), i / (BLOCK / 2));
+        vec4 now = vec4(0.0), then = vec4(0.0);
+        float frames = 1e30;
+        bool whole = true;
+        for (int k = 0; k < 4; ++k) {
+            ivec2 pixel = corner + ivec2(k & 1, k >> 1);
+            vec4 before = texelFetch(t_reprojected, min(pixel, last), 0);
+            vec4 noisy = texelFetch(t_noisy, min(pixel, last), 0);
+            if (any(greaterThan(pixel, last)) || before.w <= 0.0 || !svgf_is_finite(noisy)) { whole = false; continue; }
+            now[k] = svgf_luminance(noisy.rgb);
+            then[k] = svgf_luminance(before.rgb);
+            frames = min(frames, before.w);
+            float difference = now[k] - then[k];
+            o_difference += vec4(difference, difference * difference, 1.0 / before.w, 1.0);
+            if (before.w < 3.5) continue;   // no variance over time to speak of yet
+            vec2 moments = texelFetch(t_moments, min(pixel, last), 0).rg;
+            o_noise.zw += vec2(max(moments.y - moments.x * moments.x, 0.0) * before.w / (before.w - 1.0), 1.0);
+        }
+        if (!whole) continue;
+        o_noise.xy += vec2(rough(now), rough(then) * frames);
+        quads += 1.0;
     }
+    o_noise.xy *= quads > 0.0 ? 4.0 : 0.0;   // a quad for its four pixels
 }

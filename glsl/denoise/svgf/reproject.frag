@@ -1,4 +1,5 @@
-// What the last frame held at the surface of this pixel: bilinear over those of four texels that show it (Schied et al. 2017, sec. 4.1).
+// What the last frame held at the surface of this pixel: cubic where all around shows it, else bilinear over those of four texels that
+// do (Schied et al. 2017, sec. 4.1).
 #include "denoise/svgf/geometry.glsl"
 
 uniform sampler2D t_motion;
@@ -20,6 +21,28 @@ vec3 previous_position(vec2 uv, float depth_m) {
     return (u_previous_world_from_camera * vec4(xy, -depth_m, 1.0)).xyz;
 }
 
+// Weights of four texels in a row for a point f beyond the second (Catmull, Rom 1974): a bilinear history, resampled in every frame of a
+// pan, would blur.
+vec4 cubic(float f) {
+    vec4 w = vec4(f * (-0.5 + f * (1.0 - 0.5 * f)), 1.0 + f * f * (-2.5 + 1.5 * f), f * (0.5 + f * (2.0 - 1.5 * f)), 0.0);
+    w.w = 1.0 - w.x - w.y - w.z;
+    return w;
+}
+
+// The history at a texel, with w = 0 where it is not that of this surface.
+vec4 history_at(ivec2 texel, SvgfSurface here, float width) {
+    ivec2 size = textureSize(t_color, 0);
+    if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, size))) return vec4(0.0);
+    float depth_m = texelFetch(t_previous_depth_m, texel, 0).r;
+    if (depth_m <= 0.0) return vec4(0.0);
+    vec3 normal = texelFetch(t_previous_normal_ws, texel, 0).xyz;
+    vec3 off = previous_position((vec2(texel) + 0.5) / vec2(size), depth_m) - here.position_ws;
+    if (dot(normal, here.normal_ws) < 0.9 || abs(dot(off, here.normal_ws)) > 2.0 * width) return vec4(0.0);
+    vec4 color = texelFetch(t_color, texel, 0);
+    // A history that is not finite is none: whatever put it there is gone with this frame.
+    return color.w > 0.0 && svgf_is_finite(color) ? color : vec4(0.0);
+}
+
 void main() {
     o_color = vec4(0.0);
     o_moments = vec2(0.0);
@@ -29,26 +52,35 @@ void main() {
     vec2 motion = texelFetch(t_motion, pixel, 0).xy;
     if (!svgf_is_finite(vec4(motion, 0.0, 0.0))) return;
     vec2 at = gl_FragCoord.xy + (u_history_shift - motion) * vec2(size) - 0.5;
-    vec2 base = floor(at + 1e-4), f = max(at - base, vec2(0.0));
-    vec4 weights = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
-    float width = svgf_pixel_width(here.depth_m), total = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        ivec2 texel = ivec2(base) + ivec2(i & 1, i >> 1);
-        if (weights[i] < 1e-3 || any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, size))) continue;
-        float depth_m = texelFetch(t_previous_depth_m, texel, 0).r;
-        if (depth_m <= 0.0) continue;
-        vec3 normal = texelFetch(t_previous_normal_ws, texel, 0).xyz;
-        vec3 off = previous_position((vec2(texel) + 0.5) / vec2(size), depth_m) - here.position_ws;
-        if (dot(normal, here.normal_ws) < 0.9 || abs(dot(off, here.normal_ws)) > 2.0 * width) continue;
-        vec4 color = texelFetch(t_color, texel, 0);
+    vec2 base = floor(at + 1e-3), f = max(at - base, vec2(0.0));
+#if CUBIC
+    vec4 wx = cubic(f.x), wy = cubic(f.y);
+#else
+    vec4 wx = vec4(0.0, 1.0 - f.x, f.x, 0.0), wy = vec4(0.0, 1.0 - f.y, f.y, 0.0);
+#endif
+    float width = svgf_pixel_width(here.depth_m), total = 0.0, total_inner = 0.0;
+    vec4 inner = vec4(0.0);
+    for (int i = 0; i < 16; ++i) {
+        ivec2 k = ivec2(i & 3, i >> 2);
+        float w = wx[k.x] * wy[k.y];
+        if (abs(w) < 1e-4) continue;
+        ivec2 texel = ivec2(base) + k - 1;
+        vec4 color = history_at(texel, here, width);
+        if (color.w <= 0.0) continue;
+        o_color += w * color;
+        total += w;
+        if (any(lessThan(k, ivec2(1))) || any(greaterThan(k, ivec2(2)))) continue;
         vec2 moments = texelFetch(t_moments, texel, 0).rg;
-        // A history that is not finite is none: whatever put it there is gone with this frame.
-        if (color.w <= 0.0 || !svgf_is_finite(color) || !svgf_is_finite(moments.xyxy)) continue;
-        o_color += weights[i] * color;
-        o_moments += weights[i] * moments;
-        total += weights[i];
+        if (!svgf_is_finite(moments.xyxy)) continue;
+        vec2 near = mix(1.0 - f, f, vec2(k - 1));
+        inner += near.x * near.y * color;
+        o_moments += near.x * near.y * moments;
+        total_inner += near.x * near.y;
     }
-    if (total < 0.01) { o_color = vec4(0.0); o_moments = vec2(0.0); return; }
-    o_color /= total;
-    o_moments /= total;
+    if (total_inner < 0.01) { o_color = vec4(0.0); o_moments = vec2(0.0); return; }
+    inner /= total_inner;
+    o_moments /= total_inner;
+    // Where some of the four are missing, the others are all that is known.
+    bool whole = total_inner > 0.999 && total > 0.5;
+    o_color = vec4(whole ? o_color.rgb / total : inner.rgb, inner.w);
 }

@@ -6,28 +6,50 @@ uniform sampler2D t_color;
 uniform sampler2D t_moments;
 
 layout(location = 0) out vec4 o_estimate;  // rgb: mean; w: variance of its luminance
+layout(location = 1) out float o_guide;    // luminance, smoothed over 3 x 3 pixels
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy), size = textureSize(t_color, 0);
     vec4 color = texelFetch(t_color, pixel, 0);
     o_estimate = vec4(color.rgb, 0.0);
+    o_guide = 0.0;
     SvgfSurface here = svgf_surface(pixel);
     if (here.depth_m <= 0.0) return;
     float over_time = 0.0, weight = 0.0;
-    vec2 over_space = vec2(0.0);
-    for (int i = 0; i < 25; ++i) {
-        ivec2 at = pixel + ivec2(i % 5, i / 5) - 2;
-        if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
-        float w = svgf_same_surface(here, svgf_surface(at), 2.0);
-        vec4 other = texelFetch(t_color, at, 0);
-        vec2 moments = texelFetch(t_moments, at, 0).rg;
-        float luminance = svgf_luminance(other.rgb);
-        over_time += w * max(moments.y - moments.x * moments.x, 0.0) / max(other.w - 1.0, 1.0);
-        over_space += w * vec2(luminance, luminance * luminance);
-        weight += w;
+    vec2 narrow = vec2(0.0);
+    // Over space: the mixed difference of quads of pixels, which knows nothing of light that is constant or runs along one axis.
+    // A plain variance would take the caustic itself for noise and blur it.
+    float over_space = 0.0, quads = 0.0;
+    vec2 above[5];
+    for (int y = 0; y < 5; ++y) {
+        vec2 left = vec2(0.0);
+        for (int x = 0; x < 5; ++x) {
+            ivec2 at = pixel + ivec2(x, y) - 2;
+            bool inside = all(greaterThanEqual(at, ivec2(0))) && all(lessThan(at, size));
+            vec2 one = vec2(0.0);
+            if (inside) {
+                float w = svgf_same_surface(here, svgf_surface(at), 2.0);
+                vec4 other = texelFetch(t_color, at, 0);
+                vec2 moments = texelFetch(t_moments, at, 0).rg;
+                one = vec2(svgf_luminance(other.rgb), w);
+                over_time += w * max(moments.y - moments.x * moments.x, 0.0) / max(other.w - 1.0, 1.0);
+                weight += w;
+                int off_x = abs(x - 2), off_y = abs(y - 2);
+                if (max(off_x, off_y) < 2) narrow += w / float((1 + off_x) * (1 + off_y)) * vec2(one.x, 1.0);
+            }
+            if (x > 0 && y > 0) {
+                float w = one.y * left.y * above[x].y * above[x - 1].y;
+                float mixed = one.x - left.x - above[x].x + above[x - 1].x;
+                over_space += w * 0.25 * mixed * mixed;
+                quads += w;
+            }
+            if (x > 0) above[x - 1] = left;
+            left = one;
+        }
+        above[4] = left;
     }
     over_time /= max(weight, 1e-6);
-    over_space /= max(weight, 1e-6);
-    float spatial = max(over_space.y - over_space.x * over_space.x, 0.0);
-    o_estimate.w = mix(spatial, over_time, smoothstep(2.0, 5.0, color.w));
+    over_space /= max(quads, 1e-6);
+    o_guide = narrow.x / max(narrow.y, 1e-6);
+    o_estimate.w = mix(over_space, over_time, smoothstep(2.0, 5.0, color.w));
 }
