@@ -98,7 +98,7 @@ def measure(case: Case, timing: Timing) -> tuple[dict[str, Any], FloatArray]:
     with renderer:
         renderer.render()
         first_ms = 1e3 * (time.perf_counter() - begin)
-        values = timing.run(lambda: _frame_ms(renderer))
+        values = timing.run(lambda: frame_ms(renderer))
         frame = renderer.render()
         stats, device = frame.stats, renderer.device
         row = {
@@ -123,13 +123,28 @@ def measure(case: Case, timing: Timing) -> tuple[dict[str, Any], FloatArray]:
         return row, luminance(frame.aov["caustic_irradiance"])
 
 
-def picture(name: str, method: str, quality: str, backend: str) -> npt.NDArray[np.uint8]:
-    """The built-in scene as its own camera sees it, absorption and all: (270, 480, 3) uint8, sRGB."""
-    with Renderer(load_scene(name), size=(480, 270), method=method, quality=quality, backend=backend) as renderer:
-        return renderer.render().ldr
+def picture(
+    name: str,
+    method: str,
+    quality: str,
+    backend: str,
+    size: tuple[int, int] = (480, 270),
+    samples: int = 1,
+    frames: int = 1,
+) -> npt.NDArray[np.uint8]:
+    """The built-in scene as its own camera sees it, absorption and all: (H, W, 3) uint8, sRGB.
+
+    Args:
+        samples: a pixel. frames: of a still, so that a noisy method has settled.
+    """
+    with Renderer(load_scene(name), size=size, method=method, quality=quality, backend=backend, stats=False) as made:
+        for _ in range(frames - 1):
+            made.draw()
+        return made.render(samples=samples).ldr
 
 
-def _frame_ms(renderer: Renderer) -> float:
+def frame_ms(renderer: Renderer) -> float:
+    """One more frame: wall clock up to `finish` on a software renderer, else the sum of its timer queries."""
     device = renderer.device
     device.timing_enabled = not device.is_software
     device.ctx.finish()
@@ -185,9 +200,13 @@ def display(image: npt.ArrayLike, mean: float) -> FloatArray:
 def _flip(reference: FloatArray, image: FloatArray) -> float | None:
     """Mean LDR-FLIP of the pictures that `display` makes; None without the package."""
     mean = float(reference.mean())
-    pair = [np.repeat(display(x, mean)[..., None], 3, axis=2).astype(np.float32) for x in (reference, image)]
+    return flip_of(*(np.repeat(display(x, mean)[..., None], 3, axis=2) for x in (reference, image)))
+
+
+def flip_of(reference: FloatArray, picture: FloatArray) -> float | None:
+    """Mean LDR-FLIP of a picture (H, W, 3), sRGB encoded, in [0, 1]; None without the package."""
     try:
-        return metrics.flip(pair[0], pair[1], hdr=False).mean
+        return metrics.flip(reference.astype(np.float32), picture.astype(np.float32), hdr=False).mean
     except UsageError as error:
         if "flip-evaluator" in error.what:
             return None

@@ -23,6 +23,7 @@ def seen_radiance(
     *,
     albedo: float,
     spp: int,
+    seed: int = 7,
 ) -> FloatArray:
     """Radiance (H, W) of the target's caustic as an eye sees it past water and glass: the second of two stages.
 
@@ -56,5 +57,5 @@ def seen_radiance(
         },
     }
     integrator = mi.load_dict({"type": "path", "max_depth": 8, "rr_depth": 1000})
-    image = np.array(mi.render(mi.load_dict(parts), integrator=integrator, spp=spp, seed=7), np.float64)
+    image = np.array(mi.render(mi.load_dict(parts), integrator=integrator, spp=spp, seed=seed), np.float64)
     return np.asarray(image[..., 0] if image.shape[-1] == 1 else luminance(image))

@@ -54,6 +54,29 @@ class Halves:
         return np.sqrt(np.mean((0.5 * (self.first - self.second)) ** 2))
 
 
+def agreement(truth: Halves, other: Halves) -> dict[str, float | bool]:
+    """Whether two references differ by their noise alone: relative RMSE against what chance explains, bias of the mean.
+
+    `agree`: RMSE within 1.2 times the noise, and the bias under 0.5 % or three of its own standard errors.
+    """
+    mean = float(truth.mean.mean())
+    difference = other.mean - truth.mean
+    rrmse = float(np.sqrt(np.mean(difference**2))) / mean
+    expected = float(np.hypot(truth.noise, other.noise)) / mean
+    bias = float(difference.mean()) / mean
+    bias_noise = 0.5 * abs(float(other.first.mean() - other.second.mean())) / mean
+    sigma = max(bias_noise, expected / np.sqrt(truth.mean.size))
+    ok = rrmse <= 1.2 * expected and abs(bias) <= max(0.005, 3.0 * sigma)
+    return {
+        "rrmse": rrmse,
+        "expected_noise": expected,
+        "ratio": rrmse / expected,
+        "bias": bias,
+        "bias_sigma": float(sigma),
+        "agree": bool(ok),
+    }
+
+
 class Ptracer:
     """A scene loaded once, whose irradiance at a sensor's pixels is then estimated with any number of photons.
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import base64
 import html
-import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -13,11 +11,13 @@ import numpy.typing as npt
 
 from glcaustics.bench.analysis import caustics_ms
 from glcaustics.bench.measure import SINGULAR, WHITE, display
+from glcaustics.bench.page_parts import eye_section, mark_section, photon_section, seen_section, table_section
+from glcaustics.bench.page_tools import ERROR_SPAN, difference_map, figure, image_tag, png, show, table
 from glcaustics.bench.plots import judged
+from glcaustics.bench.tables import equal_error_tables
 
 FloatArray = npt.NDArray[np.float64]
 Report = Mapping[str, Any]
-ERROR_SPAN = 1.0  # times the mean: differences of this much are shown in full colour
 
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1c1c1c; background: #fff; margin: 2rem auto; max-width: 72rem;
@@ -30,6 +30,7 @@ th { border-bottom-color: #999; } td:first-child, th:first-child, td.text, th.te
 .maps { display: flex; flex-wrap: wrap; gap: 0.8rem; } figure { margin: 0; }
 .maps img { width: 12.5rem; image-rendering: pixelated; display: block; }
 figcaption { font-size: 0.8rem; color: #444; max-width: 12.5rem; }
+.large img { width: 22rem; } .large figcaption { max-width: 22rem; }
 .plot { max-width: 100%; } .wide { overflow-x: auto; } .bad { color: #b00020; font-weight: 600; } small { color: #555; }
 """
 
@@ -43,14 +44,19 @@ def page(
     """The whole page.
 
     Args:
-        images: irradiance maps (P, P) by "SCENE reference" and "SCENE METHOD STEP".
+        images: maps (P, P) by "SCENE reference" and "SCENE METHOD STEP", and as the parts name them.
         plots: PNG by file name.
-        pictures: (H, W, 3) uint8 by scene, as its camera sees it.
+        pictures: (H, W, 3) uint8 by scene, as its camera sees it, and as the parts name them.
     """
-    body = [_head(report), _validation(report)]
-    for scene in report["plan"]["scenes"]:
-        body.append(_scene(report, scene, images, plots, pictures[scene]))
-    body += [_curves(report, plots), _passes(report), _notes(report)]
+    body = [_head(report), mark_section(report), _validation(report)]
+    if report["rows"]:
+        body += [table_section("At equal error", equal_error_tables(report))]
+        body += [_scene(report, name, images, plots, pictures[name]) for name in report["plan"]["scenes"]]
+    body += [photon_section(report, images, plots, pictures), seen_section(report, images)]
+    body += [eye_section(report, plots, pictures)]
+    if report["rows"]:
+        body += [_curves(report, plots), _passes(report)]
+    body.append(_notes(report))
     title = "glcaustics: error against run time"
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
@@ -79,12 +85,6 @@ def _head(report: Report) -> str:
     )
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    top = "".join(f"<th>{html.escape(h)}</th>" for h in head)
-    cells = "".join("<tr>" + "".join(f"<td>{c}</td>" for c in row) + "</tr>" for row in rows)
-    return f'<div class="wide"><table><tr>{top}</tr>{cells}</table></div>'
-
-
 def _validation(report: Report) -> str:
     if not report["validation"]:
         return ""
@@ -95,7 +95,7 @@ def _validation(report: Report) -> str:
         bias = f"{v['bias']:+.3%} &plusmn; {v['bias_sigma']:.3%}"
         rows.append([html.escape(v["scene"]), *numbers, bias, verdict, html.escape(v["source"])])
     head = ["scene", "relative RMSE", "expected from noise", "ratio", "bias of the mean", "agree", "outside truth"]
-    return "<h2>Beams against Mitsuba</h2>" + _table(head, rows)
+    return "<h2>Beams against Mitsuba</h2>" + table(head, rows)
 
 
 # ---------------------------------------------------------------- a scene
@@ -112,16 +112,16 @@ def _scene(
     reference = images[f"{scene} reference"]
     mean = float(reference.mean())
     source = next(r for r in report["references"] if r["scene"] == scene)
-    figures = [_figure(_png(display(reference, mean)), f"reference: white is {WHITE:g} times the mean")]
+    figures = [figure(png(display(reference, mean)), f"reference: white is {WHITE:g} times the mean")]
     for row in rows:
         name = f"{scene} {row['method']} {row['quality']}"
         if name not in images or not _shown(row, rows):
             continue
         caption = f"{row['method']} {_step(row)}: {row['time_ms']['median']:.0f} ms"
-        figures.append(_figure(_png(display(images[name], mean)), caption))
-        figures.append(_figure(_png(_difference(images[name] - reference, mean)), f"its error, {_errors(row)}"))
-    plot = _image(plots[f"error-{scene}.png"], "plot", f"error against time, {scene}")
-    shown = _image(_png(picture / 255.0), "plot", scene)
+        figures.append(figure(png(display(images[name], mean)), caption))
+        figures.append(figure(png(difference_map(images[name] - reference, mean)), f"its error, {_errors(row)}"))
+    plot = image_tag(plots[f"error-{scene}.png"], "plot", f"error against time, {scene}")
+    shown = image_tag(png(picture / 255.0), "plot", scene)
     return (
         f"<h2>{html.escape(scene)}</h2>{shown}"
         f"<p><small>{html.escape(source['source'])}; noise {source['noise']:.2%} of the "
@@ -155,37 +155,35 @@ def _numbers(report: Report, scene: str) -> str:
         e, t = r["errors"], r["time_ms"]
         own = caustics_ms(report["rows"], r) if r["tool"] == "glcaustics" and r["method"] != "none" else None
         memory = r.get("bytes_allocated")
-        numbers = [_show(e.get(name), ".4f") for name in ("rrmse", "rrmse_regular", "mae")]
-        numbers += [_show(e.get("bias"), "+.2%")]
-        numbers += [_show(e.get("flip"), ".4f"), _show(e.get("psnr_db"), ".1f")]
+        numbers = [show(e.get(name), ".4f") for name in ("rrmse", "rrmse_regular", "mae")]
+        numbers += [show(e.get("bias"), "+.2%")]
+        numbers += [show(e.get("flip"), ".4f"), show(e.get("psnr_db"), ".1f")]
         times = [
             f"{t['median']:.1f}",
             f"{t['min']:.1f}-{t['max']:.1f}",
-            _show(own, ".1f"),
+            show(own, ".1f"),
             f"{r['first_frame_ms']:.0f}",
         ]
         size = "" if memory is None else f"{memory / 1e6:.1f}"
         name = r["method"] if r["tool"] == "glcaustics" else f"{r['tool']} {r['method']}"
         lines.append([html.escape(name), html.escape(_step(r)), f"{r['pixels']}&sup2;", *numbers, *times, size])
-    return _table(head, lines)
-
-
-def _show(value: float | None, form: str) -> str:
-    return "" if value is None else format(value, form)
+    return table(head, lines)
 
 
 # ---------------------------------------------------------------- the rest
 
 
 def _curves(report: Report, plots: Mapping[str, bytes]) -> str:
-    shown = [_image(png, "plot", name) for name, png in plots.items() if not name.startswith("error-")]
+    shown = [
+        image_tag(data, "plot", name) for name, data in plots.items() if name.startswith(("time-", "convergence."))
+    ]
     rows = []
     for one in report["scaling"]:
         fit, tool = one["fit"], one.get("tool", "glcaustics")
         numbers = [f"{fit['exponent']:.2f}", f"{fit['spread']:.2f}"] if fit else ["too few points", ""]
         rows.append([html.escape(x) for x in (one["what"], one["scene"], f"{tool} {one['method']}")] + numbers)
     head = ["what", "scene", "method", "exponent", "largest factor off the line"]
-    return "<h2>Scaling</h2>" + "".join(shown) + _table(head, rows)
+    return "<h2>Scaling</h2>" + "".join(shown) + table(head, rows)
 
 
 def _passes(report: Report) -> str:
@@ -195,9 +193,9 @@ def _passes(report: Report) -> str:
     for r in rows:
         if r["pixels"] != largest or r["quality"] != report["plan"]["qualities"][-1]:
             continue
-        lines = [[html.escape(p["name"]), _show(p["ms"], ".2f"), f"{p['bytes'] / 1e6:.2f}"] for p in r["passes"]]
+        lines = [[html.escape(p["name"]), show(p["ms"], ".2f"), f"{p['bytes'] / 1e6:.2f}"] for p in r["passes"]]
         title = f"{r['scene']}, {r['method']} {r['quality']}, {r['pixels']}&sup2;"
-        parts.append(f"<details><summary>{title}</summary>{_table(['pass', 'ms', 'MB'], lines)}</details>")
+        parts.append(f"<details><summary>{title}</summary>{table(['pass', 'ms', 'MB'], lines)}</details>")
     return "".join(parts)
 
 
@@ -209,27 +207,3 @@ def _notes(report: Report) -> str:
         *report["notes"],
     ]
     return "<h2>Notes</h2><ul>" + "".join(f"<li>{html.escape(n)}</li>" for n in notes) + "</ul>"
-
-
-def _difference(difference: FloatArray, mean: float) -> FloatArray:
-    """(H, W, 3) in [0, 1]: white is no error, red too bright, blue too dark."""
-    x = np.clip(difference / (ERROR_SPAN * mean), -1.0, 1.0)
-    fade = 1.0 - np.abs(x)
-    return np.stack([np.where(x < 0, fade, 1.0), fade, np.where(x > 0, fade, 1.0)], axis=-1)
-
-
-def _png(image: FloatArray) -> bytes:
-    from PIL import Image
-
-    buffer = io.BytesIO()
-    Image.fromarray((np.clip(image, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)).save(buffer, format="PNG")
-    return buffer.getvalue()
-
-
-def _image(png: bytes, kind: str, alt: str) -> str:
-    data = base64.b64encode(png).decode("ascii")
-    return f'<img class="{kind}" alt="{html.escape(alt)}" src="data:image/png;base64,{data}">'
-
-
-def _figure(png: bytes, caption: str) -> str:
-    return f"<figure>{_image(png, '', caption)}<figcaption>{html.escape(caption)}</figcaption></figure>"

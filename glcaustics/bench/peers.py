@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from glcaustics.bench.measure import summary
-from glcaustics.bench.mitsuba_truth import PhotonMap
-from glcaustics.bench.targets import Target
+from glcaustics.bench.mitsuba_truth import Ptracer
 from glcaustics.errors import UsageError
-from glcaustics.scene.model import Scene
 
 FloatArray = npt.NDArray[np.float64]
 RUNS = 2
 
 
 class PtracerPeer:
-    """Mitsuba on one target. In its favour, photons are aimed at the casters and the wanted pass alone is timed."""
+    """Mitsuba on one target or view. In its favour: photons aimed at the casters, and only the wanted pass is timed.
 
-    def __init__(self, scene: Scene, target: Target, pixels: int) -> None:
+    Args:
+        scene: its name. pixels: a side of the image. tracer: makes what traces it; timed as set-up.
+    """
+
+    def __init__(self, scene: str, pixels: int, tracer: Callable[[], Ptracer]) -> None:
         start = time.perf_counter()
-        self._scene, self._target, self._pixels = scene.name, target, pixels
-        self._tracer = PhotonMap(scene, target, pixels)
+        self._scene, self._pixels = scene, pixels
+        self._tracer = tracer()
         self._tracer.render(1, seed=99)  # compiles the kernels
         self.setup_ms = 1e3 * (time.perf_counter() - start)
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from glcaustics.bench.analysis import fit_power, pareto
+from glcaustics.bench.plots_parts import part_plots
+from glcaustics.bench.plots_tools import COLORS, MARKERS, log_axes, to_png
 from glcaustics.errors import UsageError
 
-COLORS = ("#0b6e99", "#c2410c", "#4d7c0f", "#7e22ce", "#b45309", "#be185d", "#0f766e", "#525252")
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 Report = Mapping[str, Any]
 
 
@@ -27,13 +26,14 @@ def plots(report: Report) -> dict[str, bytes]:
         raise UsageError("plots need the matplotlib package", where="bench", remedy=remedy) from None
     matplotlib.use("Agg")
     drawn = {}
-    for scene in report["plan"]["scenes"]:
-        drawn[f"error-{scene}.png"] = _error_against_time(report, scene)
-    drawn["convergence.png"] = _convergence(report)
+    if report["rows"]:
+        for scene in report["plan"]["scenes"]:
+            drawn[f"error-{scene}.png"] = _error_against_time(report, scene)
+        drawn["convergence.png"] = _convergence(report)
     for what in dict.fromkeys(s["what"] for s in report["scaling"]):
         if what != "error against time":
             drawn[f"{what.replace(' ', '-')}.png"] = _scaling(report, what)
-    return drawn
+    return drawn | part_plots(report)
 
 
 def tools(report: Report) -> list[tuple[str, str]]:
@@ -47,24 +47,6 @@ def judged(report: Report, scene: str) -> list[Mapping[str, Any]]:
     rows = [r for r in report["rows"] if r["scene"] == scene and r["errors"].get("rrmse")]
     largest = max((r["pixels"] for r in rows), default=0)
     return [r for r in rows if r["pixels"] == largest]
-
-
-def _axes(title: str, x: str, y: str) -> Any:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.2, 4.6), layout="constrained")
-    axes = figure.add_subplot()
-    axes.set(xscale="log", yscale="log", xlabel=x, ylabel=y, title=title)
-    axes.grid(True, which="major", color="#d4d4d4", linewidth=0.6)
-    axes.grid(True, which="minor", color="#ececec", linewidth=0.4)
-    axes.spines[["top", "right"]].set_visible(False)
-    return figure, axes
-
-
-def _png(figure: Any) -> bytes:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    return buffer.getvalue()
 
 
 def _style(report: Report, name: tuple[str, str]) -> dict[str, str]:
@@ -83,7 +65,7 @@ def _error_against_time(report: Report, scene: str) -> bytes:
     rows = judged(report, scene)
     clock = next((r["time_ms"]["clock"] for r in rows if r["tool"] == "glcaustics"), "wall clock")
     pixels = rows[0]["pixels"] if rows else 0
-    figure, axes = _axes(
+    figure, axes = log_axes(
         f"{scene}, {pixels} x {pixels}", f"time of a frame, ms ({clock})", "relative RMSE of irradiance"
     )
     points = [(r["time_ms"]["median"], r["errors"]["rrmse"]) for r in rows]
@@ -106,11 +88,11 @@ def _error_against_time(report: Report, scene: str) -> bytes:
         axes.plot(*zip(*front, strict=True), color="black", alpha=0.12, linewidth=9, zorder=0, label="Pareto front")
     if points:
         axes.legend(fontsize=8, frameon=False)
-    return _png(figure)
+    return to_png(figure)
 
 
 def _convergence(report: Report) -> bytes:
-    figure, axes = _axes("Convergence of the peers", "photons", "relative RMSE of irradiance")
+    figure, axes = log_axes("Convergence of the peers", "photons", "relative RMSE of irradiance")
     for index, scene in enumerate(report["plan"]["scenes"]):
         for method, line in (("ptracer", "-"), ("ptracer+oidn", ":")):
             rows = [r for r in judged(report, scene) if r["tool"] == "mitsuba" and r["method"] == method]
@@ -131,12 +113,12 @@ def _convergence(report: Report) -> bytes:
             )
     if axes.lines:
         axes.legend(fontsize=7, frameon=False)
-    return _png(figure)
+    return to_png(figure)
 
 
 def _scaling(report: Report, what: str) -> bytes:
     series: Sequence[Any] = [s for s in report["scaling"] if s["what"] == what]
-    figure, axes = _axes(f"{what[0].upper()}{what[1:]} ({series[0]['scene']})", what.split(" against ")[1], "ms")
+    figure, axes = log_axes(f"{what[0].upper()}{what[1:]} ({series[0]['scene']})", what.split(" against ")[1], "ms")
     for index, one in enumerate(series):
         x, y = zip(*one["points"], strict=True)
         slope = f", exponent {one['fit']['exponent']:.2f}" if one["fit"] else ""
@@ -148,4 +130,4 @@ def _scaling(report: Report, what: str) -> bytes:
             label=f"{one['method']}{slope}",
         )
     axes.legend(fontsize=8, frameon=False)
-    return _png(figure)
+    return to_png(figure)

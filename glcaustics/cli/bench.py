@@ -16,7 +16,7 @@ from glcaustics.errors import UsageError
 from glcaustics.output import write_bytes, write_text
 
 if TYPE_CHECKING:
-    from glcaustics.bench.study import Plan
+    from glcaustics.bench.plan import Plan
 
 
 def bench_command(args: argparse.Namespace) -> int:
@@ -54,6 +54,7 @@ def _measure(args: argparse.Namespace) -> dict[str, Any]:
     from glcaustics.bench.page import page
     from glcaustics.bench.plots import plots
     from glcaustics.bench.study import Study
+    from glcaustics.bench.tables import all_tables
 
     folder = Path(args.output)
     arguments = [a for a in sys.argv[1:] if a != "bench"]
@@ -71,12 +72,14 @@ def _measure(args: argparse.Namespace) -> dict[str, Any]:
                 f"{v['scene']}: beams and Mitsuba differ by {v['ratio']:.2f} times their noise, bias {v['bias']:+.2%}"
             )
             print(f"warning: {text}", file=sys.stderr)
+    for one in all_tables(report):
+        print(one.text(), end="\n\n")
     print(f"{folder / 'report.html'}: {len(report['rows'])} measurements, {report['seconds']:.0f} s")
     return report
 
 
 def _plan(args: argparse.Namespace) -> Plan:
-    from glcaustics.bench.study import FULL, QUICK
+    from glcaustics.bench.plan import FULL, PARTS, QUICK
     from glcaustics.bench.targets import TARGETS
     from glcaustics.caustics.method import QUALITIES
     from glcaustics.caustics.registry import METHODS
@@ -86,6 +89,7 @@ def _plan(args: argparse.Namespace) -> Plan:
         "scenes": (args.scenes, TARGETS, "scene with a target"),
         "methods": (args.methods, METHODS, "caustics method"),
         "qualities": (args.qualities, QUALITIES, "quality"),
+        "parts": (args.parts, PARTS, "part of the bench"),
     }
     changes: dict[str, Any] = {}
     for name, (given, names, kind) in known.items():

@@ -126,7 +126,10 @@ _BENCH_EPILOG = (
 
 def _add_bench_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("-o", "--output", default="bench-report", metavar="DIR", help="default: bench-report")
-    command.add_argument("--quick", action="store_true", help="four scenes, small, in under three minutes")
+    command.add_argument("--quick", action="store_true", help="four scenes, small, in about three minutes")
+    command.add_argument(
+        "--parts", nargs="+", action="extend", metavar="NAME", help="caustics, photons, eye, seen (default: all)"
+    )
     for name, text in (("scenes", "of the built-in ones"), ("methods", "see methods"), ("qualities", "draft to high")):
         command.add_argument(f"--{name}", nargs="+", action="extend", metavar="NAME", help=text)
     command.add_argument("--sizes", nargs="+", type=positive_int, metavar="N", help="sides of the maps, pixels")

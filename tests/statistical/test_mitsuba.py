@@ -18,7 +18,7 @@ from glcaustics.bench.mitsuba_seen import seen_radiance
 from glcaustics.bench.mitsuba_truth import PhotonMap, Pinhole, enlarged, mitsuba_reference
 from glcaustics.bench.references import beam_reference
 from glcaustics.bench.store import Store
-from glcaustics.bench.study import agreement
+from glcaustics.bench.mitsuba_truth import agreement
 from glcaustics.bench.targets import Target, bench_scene, target_of
 from glcaustics.errors import UsageError
 from glcaustics.scene.model import Camera, Instance, Light, LightKind, Material, Mesh, Scene

@@ -10,8 +10,7 @@ import pytest
 
 from glcaustics.bench.analysis import caustics_ms, cost_at_error, fit_power, pareto, regressions, table
 from glcaustics.bench.measure import errors, reduced, regular
-from glcaustics.bench.mitsuba_truth import Halves
-from glcaustics.bench.study import agreement
+from glcaustics.bench.mitsuba_truth import Halves, agreement
 
 
 def row(method: str, ms: float, rrmse: float | None = None, **more: Any) -> dict[str, Any]:

@@ -101,6 +101,7 @@ def test_check_passes_and_fails_by_exit_code(stored: Path, tmp_path: Path, capsy
         (["--qualities", "best"], "there is no quality"),
         (["--sizes", "64", "100", "-o", "{folder}/out"], "does not divide"),
         (["--sizes", "0"], "whole number"),
+        (["--parts", "eyes"], "did you mean eye"),
         (["--quick", "-o", "{folder}/not.json/deep"], "cannot make the folder"),
     ],
 )

@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from glcaustics.bench.caustics_part import CausticsPart
+from glcaustics.bench.cells import Cells
 from glcaustics.bench.luxcore_peer import BORDER, has_luxcore, luxcore_rows, luxcore_scene
+from glcaustics.bench.plan import QUICK
 from glcaustics.bench.references import beam_reference
 from glcaustics.bench.store import Store
-from glcaustics.bench.study import QUICK, Study
 from glcaustics.bench.targets import bench_scene, target_of
 
 
@@ -48,8 +50,8 @@ def test_picture_agrees_with_the_beams_in_absolute_units(tmp_path: Path) -> None
 
 
 def test_absence_is_announced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("glcaustics.bench.study.has_luxcore", lambda: False)
-    study = Study(QUICK, tmp_path)
-    study._luxcore(bench_scene("pool"), target_of("pool"), None)  # type: ignore[arg-type]
-    assert study.rows == []
-    assert study.notes == ["pyluxcore is not installed (extra luxcore): LuxCore's LIGHTCPU is left out"]
+    monkeypatch.setattr("glcaustics.bench.caustics_part.has_luxcore", lambda: False)
+    part = CausticsPart(QUICK, Cells(tmp_path, "auto", 1))
+    part._luxcore(bench_scene("pool"), target_of("pool"), None)  # type: ignore[arg-type]
+    assert part.rows == []
+    assert part.cells.notes == ["pyluxcore is not installed (extra luxcore): LuxCore's LIGHTCPU is left out"]

@@ -1,0 +1,234 @@
+"""What the parts found as tables, for the terminal and for the page alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from glcaustics.bench.equal_error import DENOISED, PTRACER, ratio_text
+
+Report = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Table:
+    """`rows` of texts under `head`; `note` in one line."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+
+    def text(self) -> str:
+        """For a terminal: first column left, the others right."""
+        lines = [self.head, *self.rows]
+        widths = [max(len(line[k]) for line in lines) for k in range(len(self.head))]
+
+        def padded(line: Sequence[str]) -> str:
+            cells = [
+                cell.ljust(w) if k == 0 else cell.rjust(w) for k, (cell, w) in enumerate(zip(line, widths, strict=True))
+            ]
+            return "  ".join(cells).rstrip()
+
+        return "\n".join(
+            [self.title, *(f"  {padded(line)}" for line in lines), *([f"  ({self.note})"] if self.note else [])]
+        )
+
+
+def all_tables(report: Report) -> Iterator[Table]:
+    """Every table of a report, in the order of its parts; what was not measured is left out."""
+    yield from equal_error_tables(report)
+    yield from photon_tables(report)
+    yield from eye_tables(report)
+    yield from seen_tables(report)
+    yield from mark_tables(report)
+
+
+def equal_error_tables(report: Report) -> Iterator[Table]:
+    """Per scene: how many times faster than the peers at equal error."""
+    entries = report.get("equal_error") or []
+    rows = []
+    for e in entries:
+        law = e["law"]
+        slope = "" if law is None or law["exponent"] is None else f"{law['exponent']:+.2f}"
+        need = f"{e[PTRACER]['ms'] / 1e3:.3g}" if PTRACER in e else ""
+        cells = [
+            f"{e['scene']} {e['method']} {e['quality']}",
+            f"{e['pixels']}^2",
+            f"{e['rrmse']:.4f}",
+            f"{e['ms']:.0f}",
+        ]
+        rows.append([*cells, need, ratio_text(e, PTRACER), ratio_text(e, DENOISED), slope])
+    if rows:
+        head = (
+            "at equal error",
+            "map",
+            "rel. RMSE",
+            "our ms",
+            "ptracer s",
+            "faster than ptracer",
+            "than ptracer + OIDN",
+            "slope",
+        )
+        yield Table("Times faster than Mitsuba's ptracer at equal error", head, rows, PTRACER_NOTE)
+
+
+PTRACER_NOTE = (
+    "ptracer's error is taken as (photons)^-1/2 through the measured counts, extrapolated where said; slope: of its "
+    "error against photons as measured; with OIDN interpolated, else > by its best measured error, < by its first"
+)
+
+
+def photon_tables(report: Report) -> Iterator[Table]:
+    """Per scene: errors after static frames, equal error, cost of the stages."""
+    for one in report.get("photons") or []:
+        yield _static_table(one)
+        if one.get("equal"):
+            yield _equal_time_table(one)
+        yield _stage_table(one)
+
+
+def _static_table(one: Mapping[str, Any]) -> Table:
+    p, reference, rows = one["settings"], one["reference"], []
+    flips = {f["photons"]: f["flip"] for f in one["final"]}
+    for row in one["static"]:
+        errors = [f"{s['rrmse']:.4f}" for s in row["series"]]
+        flip = flips.get(row["photons"])
+        cells = [f"{row['photons']}", *errors, f"{row['rrmse_plain']:.4f}", f"{row['bias']:+.2%}"]
+        rows.append(
+            [*cells, "" if flip is None else f"{flip:.4f}", f"{row['frame_ms']:.0f}", f"{row['processor_ms']:.0f}"]
+        )
+    frames = [f"{s['frames']} frames" for s in one["static"][0]["series"]]
+    head = ("photons a frame", *frames, "without edges", "bias", "FLIP of the picture", "frame ms", "processor ms")
+    note = (
+        f"picture {p['side']}^2, light views {p['view_size']}^2; {reference['source']}, noise "
+        f"{reference['noise']:.2%}; FLIP against the same picture with the reference's irradiance in it"
+    )
+    if v := one.get("validation"):
+        note += (
+            f"; Mitsuba on what the eye sees directly: differs by {v['ratio']:.2f} times the noise of both, bias "
+            f"{v['bias']:+.2%} +- {v['bias_sigma']:.2%}"
+        )
+    title = f"{one['scene']}: relative RMSE of photon_trace at the camera's pixels, filtered to {p['filtered']}^2"
+    return Table(title, head, rows, note)
+
+
+def _equal_time_table(one: Mapping[str, Any]) -> Table:
+    equal, rows = one["equal"], []
+    for e in equal["ours"]:
+        cells = [f"photon_trace, {e['frames']} frames of {e['photons']}", f"{e['ms']:.0f}", f"{e['rrmse']:.4f}"]
+        rows.append([*cells, ratio_text(e, PTRACER), ratio_text(e, DENOISED)])
+    for name in (PTRACER, DENOISED):
+        rows += [
+            [f"{name}, {r['photons']} photons", f"{r['ms']:.0f}", f"{r['rrmse']:.4f}", "", ""] for r in equal[name]
+        ]
+    head = ("tool", "ms", "rel. RMSE", "faster than ptracer", "than ptracer + OIDN")
+    pixels = f"{equal['share']:.0%} of {equal['pixels']}^2 pixels"
+    note = f"on the {pixels} that ptracer can show: seen directly, one surface alone"
+    return Table(f"{one['scene']}: at equal error on what the eye sees directly", head, rows, note)
+
+
+def _stage_table(one: Mapping[str, Any]) -> Table:
+    rows = []
+    dda = {r["photons"]: r["ms"]["tracing"] for r in one["stages"] if r["march"] == "dda"}
+    for r in one["stages"]:
+        ms = r["ms"]
+        three = sum(ms[name] for name in ("tracing", "storing", "denoising"))
+        shares = [f"{ms[name]:.0f} ({ms[name] / three:.0%})" for name in ("tracing", "storing", "denoising")]
+        ours = r["march"] != "dda"
+        hits = r["same_hits"]["share"] if ours else None
+        ratio = f"{ms['tracing'] / dda[r['photons']]:.2f}" if ours else ""
+        cells = [f"{r['photons']} {r['march']}", *shares, f"{ms['buffers']:.0f}"]
+        rows.append([*cells, ratio, "" if hits is None else f"{hits:.2%}"])
+    first = one["stages"][0]
+    head = ("photons", "tracing", "storing", "denoising", "views it needs", "tracing of dda's", "same hits")
+    width, height = first["size"]
+    views = f"light views {first['view_size']}^2"
+    note = f"{width}x{height}, {views}; ms by {first['clock']}; median of {first['frames']} frames"
+    return Table(f"{one['scene']}: milliseconds and shares of a frame", head, rows, note)
+
+
+# ---------------------------------------------------------------- eye and light rays
+
+
+def eye_tables(report: Report) -> Iterator[Table]:
+    """Convergence pooled over the views, and cost by view and solver."""
+    eye = report.get("eye")
+    if not eye:
+        return
+    p = eye["settings"]
+    size = f"{p['size'][0]}x{p['size'][1]}"
+    for key, name, share in (("eye_rays", "pixel", "within_1px"), ("light_rays", "texel", "within_1texel")):
+        if eye[key]:
+            yield _convergence_table(eye[key], name, share, f"{p['views']} seeded views a scene", size)
+    if eye["costs"]:
+        yield _cost_table(eye["costs"])
+
+
+def _convergence_table(found: Sequence[Any], name: str, share: str, views: str, size: str) -> Table:
+    rows = []
+    for one in found:
+        pooled = one["pooled"]
+        label = one["scene"] + (f", {one['branch']}" if "branch" in one else "")
+        last = [pooled["cascade"], pooled["hierarchical"]] if "cascade" in pooled else [pooled["marched"]]
+        rows.append(
+            [label, *(f"{v:.4f}" for v in pooled[share]), f"{max(pooled['wrong']):.4f}", *(f"{v:.4f}" for v in last)]
+        )
+    counts = [str(k) for k in found[0]["pooled"]["iterations"]]
+    ends = ("cascade", "hierarchical") if "cascade" in found[0]["pooled"] else ("as shipped",)
+    kind = "eye rays" if name == "pixel" else "light rays"
+    note = (
+        f"{views}"
+        + (f" at {size}" if name == "pixel" else "")
+        + "; of the resolvable rays; wrong: said solved, but farther off"
+    )
+    return Table(
+        f"Newton's share of {kind} within one {name} after k iterations", ("scene", *counts, "wrong", *ends), rows, note
+    )
+
+
+def _cost_table(costs: Sequence[Any]) -> Table:
+    solvers = list(costs[0]["with_reflections"])
+    rows = []
+    for one in costs:
+        dda = one["without"].get("dda", {}).get("total")
+        cells = [f"{one['scene']}, view {one['view']}"]
+        cells += [f"{one['with_reflections'][s]['total']:.1f} / {one['without'][s]['total']:.1f}" for s in solvers]
+        ratio = f"{one['without']['cascade']['total'] / dda:.2f}" if dda else ""
+        rows.append([*cells, ratio])
+    width, height = costs[0]["size"]
+    note = f"{width}x{height}; whole pass with / without reflections; unit: one full-screen fetch of rgba32f"
+    return Table("Cost of eye rays in fetch passes", ("scene", *solvers, "cascade of dda's"), rows, note)
+
+
+# ---------------------------------------------------------------- through water; marks
+
+
+def seen_tables(report: Report) -> Iterator[Table]:
+    """The caustic through water."""
+    seen = report.get("seen")
+    if not seen:
+        return
+    rows = []
+    for e in seen["ours"]:
+        cells = [f"glcaustics {e['quality']}", f"{e['time_ms']['median']:.0f}", f"{e['rrmse']:.4f}"]
+        rows.append(
+            [*cells, f"{e['bias']:+.2%}", f"{e['solved']:.1%}", ratio_text(e, PTRACER), ratio_text(e, DENOISED)]
+        )
+    for r in seen["peers"]:
+        name = f"{r['method']}, {r['photons']} photons, {r['spp']} samples a pixel"
+        rows.append([name, f"{r['ms']:.0f}", f"{r['rrmse']:.4f}", "", "", "", ""])
+    head = ("tool", "ms", "rel. RMSE", "bias", "solved", "faster than ptracer", "than ptracer + OIDN")
+    note = f"{seen['settings']['side']}^2; {seen['source']}, noise {seen['noise']:.2%}; peers: both stages by Mitsuba"
+    yield Table(f"{seen['scene']}: the caustic seen through the water", head, rows, note)
+
+
+def mark_tables(report: Report) -> Iterator[Table]:
+    """What was aimed at, and what was measured."""
+    rows = [
+        [m["what"], m["mark"], m["measured"], "met" if m["met"] else "NOT met", m["at"]]
+        for m in report.get("marks") or []
+    ]
+    if rows:
+        yield Table("Marks", ("what", "mark", "measured", "", "at"), rows)
