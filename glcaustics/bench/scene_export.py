@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from glcaustics.errors import SceneError, UsageError
 from glcaustics.optics.beam_scene import BeamLight, BeamMesh, BeamScene, BeamWater, SurfaceKind, SurfaceOptics
+from glcaustics.optics.beam_spread import RoughOptics, SizedBeamLight
 from glcaustics.optics.beams import HeightField
 from glcaustics.optics.receivers import PlaneGrid
 from glcaustics.scene.model import Camera, Instance, Light, LightKind, Material, OpticalKind, Scene, WaterBody
@@ -15,24 +16,31 @@ from glcaustics.scene.water import WaveSurface, surface_of
 FloatArray = npt.NDArray[np.float64]
 
 
-def beam_scene(scene: Scene, time_s: float = 0.0, *, analytic_water: bool = True) -> BeamScene:
+def beam_scene(
+    scene: Scene, time_s: float = 0.0, *, analytic_water: bool = True, spread: int | None = 256, rough: bool = False
+) -> BeamScene:
     """The scene at a time for `glcaustics.optics.reference`.
 
     Args:
         analytic_water: sums of waves as formulas instead of their meshes: the truth that a finer mesh would approach.
             False: the meshes that the renderer and other tools get.
+        spread: points that stand for a light with a size, and facets for a rough surface; None: points and smooth.
+        rough: trace rough specular surfaces as such. Off: smooth, as most methods take them.
     """
-    meshes = [beam_mesh(instance) for instance in scene.instances]
+    facets = spread if rough else None
+    meshes = [beam_mesh(instance, facets) for instance in scene.instances]
     waters, notes = [], []
     for body in scene.waters:
-        water = _analytic(body, time_s) if analytic_water else None
+        water = _analytic(body, time_s, facets) if analytic_water else None
         if water is not None:
             waters.append(water)
             continue
         if analytic_water:
             notes.append(f"water '{body.name}' has no formula to trace: its mesh stands for it")
-        meshes.append(beam_mesh(Instance(body.name, body.mesh_at(time_s), body.material, body.world_from_object)))
-    lights = tuple(beam_light(light) for light in scene.lights if light.shines)
+        meshes.append(
+            beam_mesh(Instance(body.name, body.mesh_at(time_s), body.material, body.world_from_object), facets)
+        )
+    lights = tuple(beam_light(light, spread) for light in scene.lights if light.shines)
     return BeamScene(tuple(meshes), lights, tuple(waters), scene.name, tuple(notes))
 
 
@@ -48,7 +56,7 @@ def world_normals(instance: Instance) -> FloatArray:
     return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
 
 
-def beam_mesh(instance: Instance) -> BeamMesh:
+def beam_mesh(instance: Instance, facets: int | None = None) -> BeamMesh:
     """One instance in world space; a mirroring transform turns its triangles round."""
     triangles = instance.mesh.triangles.astype(np.int64)
     if np.linalg.det(instance.world_from_object[:3, :3]) < 0.0:
@@ -57,11 +65,18 @@ def beam_mesh(instance: Instance) -> BeamMesh:
         instance.positions_ws().astype(np.float64),
         world_normals(instance),
         triangles,
-        _optics(instance.optical_kind, instance.material),
+        _optics(instance.optical_kind, instance.material, facets),
     )
 
 
-def _optics(kind: OpticalKind, material: Material) -> SurfaceOptics:
+def _optics(kind: OpticalKind, material: Material, facets: int | None) -> SurfaceOptics:
+    plain = _smooth_optics(kind, material)
+    if facets is None or kind is OpticalKind.DIFFUSE or material.roughness == 0.0:
+        return plain
+    return RoughOptics(**vars(plain), roughness=float(material.roughness), facets=facets)
+
+
+def _smooth_optics(kind: OpticalKind, material: Material) -> SurfaceOptics:
     if kind is OpticalKind.DIFFUSE:
         return SurfaceOptics(SurfaceKind.DIFFUSE)
     if kind is OpticalKind.MIRROR:
@@ -76,8 +91,18 @@ def _three(values: npt.ArrayLike) -> tuple[float, float, float]:
     return a, b, c
 
 
-def beam_light(light: Light) -> BeamLight:
-    """Colour times intensity, and the cone of a spot."""
+def beam_light(light: Light, points: int | None = 256) -> BeamLight:
+    """Colour times intensity, the cone of a spot, and a light's size as a sum over `points` (None: no size)."""
+    plain = _point_light(light)
+    if points is None or not light.has_size:
+        return plain
+    radius_m = 0.0 if light.kind is LightKind.DIRECTIONAL else light.radius_m
+    return SizedBeamLight(
+        **vars(plain), radius_m=radius_m, angular_radius_rad=0.5 * light.angular_diameter_rad, points=points
+    )
+
+
+def _point_light(light: Light) -> BeamLight:
     intensity = _three(np.asarray(light.color) * light.intensity)
     if light.kind is LightKind.DIRECTIONAL:
         return BeamLight(intensity, _three(light.direction_ws))
@@ -88,7 +113,7 @@ def beam_light(light: Light) -> BeamLight:
     )
 
 
-def _analytic(body: WaterBody, time_s: float) -> BeamWater | None:
+def _analytic(body: WaterBody, time_s: float, facets: int | None) -> BeamWater | None:
     """The water's formula, if it is a sum of plain sine waves that lies level; else None."""
     try:
         surface = surface_of(body)
@@ -106,7 +131,12 @@ def _analytic(body: WaterBody, time_s: float) -> BeamWater | None:
     bound = sum(abs(w.amplitude_m) for w in surface.waves)
     key = repr((surface.waves, float(time_s))).encode()
     return BeamWater(
-        field, _three(body.world_from_object[:3, 3]), (x, z), bound, _optics(OpticalKind.INTERFACE, body.material), key
+        field,
+        _three(body.world_from_object[:3, 3]),
+        (x, z),
+        bound,
+        _optics(OpticalKind.INTERFACE, body.material, facets),
+        key,
     )
 
 

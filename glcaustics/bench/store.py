@@ -52,6 +52,8 @@ def scene_key(scene: Scene) -> str:
     for light in scene.lights:
         parts.append([light.kind.value, light.color, light.intensity, light.position_ws, light.direction_ws])
         parts.append([light.inner_cone_rad, light.outer_cone_rad])
+        if light.has_size:  # left out without one: keys of scenes from before there were sizes stay
+            parts.append([light.radius_m, light.angular_diameter_rad])
     return digest(*parts)
 
 

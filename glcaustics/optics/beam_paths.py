@@ -9,7 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from glcaustics.optics.beam_scene import BeamScene, SurfaceKind
+from glcaustics.optics.beam_spread import Facets, RoughOptics
 from glcaustics.optics.fresnel import fresnel_dielectric
+from glcaustics.optics.microfacet import ggx_visible_share, visible_normals
 from glcaustics.optics.raycast import Hits, RayCaster
 from glcaustics.optics.refract import refract
 
@@ -60,15 +62,17 @@ class _Rays:
 
 
 class PathTracer:
-    """Rays through a scene, for one colour channel's index of refraction."""
+    """Rays through a scene, for one colour channel's index of refraction and one sample of rough surfaces' facets."""
 
-    def __init__(self, scene: BeamScene, caster: RayCaster, channel: int = 1) -> None:
+    def __init__(self, scene: BeamScene, caster: RayCaster, channel: int = 1, facets: Facets | None = None) -> None:
         self.caster = caster
+        self._facets = facets
         optics = scene.optics()
         self._kind = np.array([int(o.kind) for o in optics])
         self._ior = np.array([o.ior_rgb[channel] for o in optics])
         self._sigma = np.array([o.sigma_a_per_m for o in optics], np.float64)
         self._transmission = np.array([o.transmission for o in optics], np.float64)
+        self._alpha = np.array([o.roughness**2 if isinstance(o, RoughOptics) else 0.0 for o in optics], np.float64)
         self._reflectance = np.array([o.reflectance for o in optics], np.float64)
 
     def branches(self, max_events: int, *, reflect: bool = True) -> list[str]:
@@ -103,7 +107,9 @@ class PathTracer:
             rays, hits, normal, entering = self._advance(rays, event)
             if step == 0 and from_light:
                 rays.throughput = rays.throughput * self._source_medium(hits, entering)
-            direction, share, sigma = self._scatter(event, rays.direction, normal, hits.object_id, entering)
+            facet = self._facet_normals(step, rays.direction, normal, hits.object_id)
+            direction, share, sigma = self._scatter(event, rays.direction, facet, hits.object_id, entering)
+            share = share * self._way_out(event, direction, normal, hits.object_id)[:, None]
             rays.origin, rays.direction, rays.sigma = hits.point_ws, direction, sigma
             rays.throughput = rays.throughput * share
             rays.last_object = hits.object_id
@@ -135,6 +141,21 @@ class PathTracer:
         absorbed = np.exp(-self._sigma[hits.object_id] * hits.t[:, None])
         inside = ~entering & (self._kind[hits.object_id] == SurfaceKind.DIELECTRIC)
         return np.where(inside[:, None], absorbed, 1.0)
+
+    def _facet_normals(self, step: int, direction: FloatArray, normal: FloatArray, object_id: IntArray) -> FloatArray:
+        """(n, 3): of the microfacets that the rays meet at their event number `step`."""
+        alpha = self._alpha[object_id]
+        if self._facets is None or not alpha.any():
+            return normal
+        rough = visible_normals(normal, direction, alpha, self._facets.samples[step], self._facets.axis_ws)
+        return np.where((alpha > 0.0)[:, None], rough, normal)
+
+    def _way_out(self, event: str, direction: FloatArray, normal: FloatArray, object_id: IntArray) -> FloatArray:
+        """Share (n,) that other microfacets let out: G2 / G1 with separable masking; 0 into the surface."""
+        alpha = self._alpha[object_id]
+        cosine = np.einsum("ij,ij->i", direction, normal) * (1.0 if event == "R" else -1.0)
+        share = ggx_visible_share(np.clip(cosine, 1e-9, 1.0), alpha)
+        return np.where(alpha > 0.0, np.where(cosine > 0.0, share, 0.0), 1.0)
 
     def _scatter(
         self, event: str, direction: FloatArray, normal: FloatArray, object_id: IntArray, entering: BoolArray

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from glcaustics.optics.beam_paths import Landings, PathTracer
 from glcaustics.optics.beam_scene import BeamScene
+from glcaustics.optics.beam_spread import spread
 from glcaustics.optics.light_mesh import LightPatch, light_patches
 from glcaustics.optics.raycast import RayCaster
 from glcaustics.optics.receivers import Receiver
@@ -187,7 +188,12 @@ def trace_beams(scene: BeamScene, receiver: Receiver, settings: BeamSettings) ->
     everything = np.concatenate([specular, *(m.positions_ws for m in scene.meshes)])
     bounds = np.stack([everything.min(axis=0), everything.max(axis=0)])
     groups = [(c, np.eye(3)[c]) for c in range(3)] if scene.has_dispersion() else [(1, np.ones(3))]
-    for number, light in enumerate(scene.lights):
+    parts = (
+        part
+        for number, light in enumerate(scene.lights)
+        for part in spread(light, scene, specular, settings.max_events, settings.seed * 1009 + number)
+    )
+    for number, (light, facets) in enumerate(parts):
         for patch in light_patches(light, specular, bounds, settings.seed * 1009 + number):
             size = patch.high_uv - patch.low_uv
             cell = float(np.sqrt(size.prod())) / settings.cells
@@ -197,7 +203,7 @@ def trace_beams(scene: BeamScene, receiver: Receiver, settings: BeamSettings) ->
             ]
             balance.emitted += _emitted(patch, lines) * np.asarray(light.intensity_rgb)
             for channel, mask in groups:
-                tracer = PathTracer(scene, caster, channel)
+                tracer = PathTracer(scene, caster, channel, facets)
                 color = mask * np.asarray(light.intensity_rgb, np.float64)
                 for branch in tracer.branches(settings.max_events, reflect=settings.reflect):
                     trace = _BranchTrace(tracer, patch, branch, color, receiver, settings, balance)
