@@ -17,11 +17,13 @@ FULL_OF_WATER = 0.9  # share of the picture that is specular
 SAME_HITS, MARCH_COST = 0.995, 1.0 / 3.0
 PHOTON_RRMSE, PHOTON_FLIP = 0.10, 0.05
 EQUAL_ERROR = 1000.0
+MESH_RRMSE = {(128, 512): 0.035, (256, 1024): 0.010}  # (mesh, map) without folds
+FOLDED_MAE, FOLDED_MAP, STEADY_ORDER = 0.08, 1024, 1.0
 
 
 def marks(report: Report) -> list[Mark]:
     """Every mark that the report has numbers for."""
-    return [*_equal_error(report), *_photons(report), *_eye(report)]
+    return [*_equal_error(report), *_mesh(report), *_photons(report), *_eye(report)]
 
 
 def _mark(what: str, mark: str, measured: str, met: bool, at: str) -> Mark:
@@ -35,6 +37,25 @@ def _equal_error(report: Report) -> Iterator[Mark]:
         ratio = best[PTRACER]["ratio"]
         what = "displaced_mesh on peer-pool, times faster than ptracer at equal error"
         yield _mark(what, f">= {EQUAL_ERROR:.0f}", ratio_text(best, PTRACER), ratio >= EQUAL_ERROR, at)
+
+
+def _mesh(report: Report) -> Iterator[Mark]:
+    mesh = report.get("mesh")
+    if not mesh:
+        return
+    for r in mesh["rows"]:
+        what = f"displaced_mesh on peer-pool, s={r['strength']:g}, mesh {r['mesh']}^2, map {r['map']}^2"
+        limit = MESH_RRMSE.get((r["mesh"], r["map"]))
+        if r["strength"] == 1.0 and limit is not None:
+            yield _mark(
+                f"{what}: relative RMSE", f"<= {limit:.3f}", f"{r['rrmse']:.4f}", r["rrmse"] <= limit, "slanted"
+            )
+        if r["strength"] == 2.0 and r["map"] == FOLDED_MAP:
+            yield _mark(f"{what}: MAE", f"<= {FOLDED_MAE:.2f}", f"{r['mae']:.4f}", r["mae"] <= FOLDED_MAE, "slanted")
+    if mesh["orders"]:
+        least = min(mesh["orders"])
+        what = "displaced_mesh on peer-pool: order of the error's fall"
+        yield _mark(what, f">= {STEADY_ORDER:.1f}", f"{least:.2f}", least >= STEADY_ORDER, "mesh and map together")
 
 
 def _photons(report: Report) -> Iterator[Mark]:

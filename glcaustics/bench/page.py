@@ -14,7 +14,7 @@ from glcaustics.bench.measure import SINGULAR, WHITE, display
 from glcaustics.bench.page_parts import eye_section, mark_section, photon_section, seen_section, table_section
 from glcaustics.bench.page_tools import ERROR_SPAN, difference_map, figure, image_tag, png, show, table
 from glcaustics.bench.plots import judged
-from glcaustics.bench.tables import equal_error_tables
+from glcaustics.bench.tables import equal_error_tables, mesh_tables
 
 FloatArray = npt.NDArray[np.float64]
 Report = Mapping[str, Any]
@@ -52,6 +52,7 @@ def page(
     if report["rows"]:
         body += [table_section("At equal error", equal_error_tables(report))]
         body += [_scene(report, name, images, plots, pictures[name]) for name in report["plan"]["scenes"]]
+    body.append(table_section("Displaced mesh", mesh_tables(report)))
     body += [photon_section(report, images, plots, pictures), seen_section(report, images)]
     body += [eye_section(report, plots, pictures)]
     if report["rows"]:

@@ -10,6 +10,7 @@ from glcaustics.caustics.registry import METHODS
 PARTS = {
     "caustics": "error against run time of every method and of its peers, and times at equal error",
     "photons": "photon_trace in the flooded scenes: error at the camera's pixels, its cost, its peers",
+    "mesh": "the displaced mesh on peer-pool as published implementations were measured",
     "eye": "convergence and cost of eye rays and light rays over seeded views",
     "seen": "the caustic as an eye sees it through water, against Mitsuba in two stages",
 }
@@ -67,6 +68,16 @@ class SeenPlan:
 
 
 @dataclass(frozen=True)
+class MeshPlan:
+    """(mesh, map) a side without folds and with; `pixels` of the picture; `cells` of the reference's light mesh."""
+
+    smooth: tuple[tuple[int, int], ...] = ((64, 256), (128, 512), (256, 1024))
+    folded: tuple[tuple[int, int], ...] = ((256, 1024), (512, 1024))
+    pixels: int = 1024
+    cells: int = 1536
+
+
+@dataclass(frozen=True)
 class Plan:
     """What is measured. `sizes`: pixels a side, each a divisor of the largest; `photons`: of the peers;
     `validate`: photons of each Mitsuba half that the beams are held against, 0 = not; `seconds`: given to LuxCore;
@@ -88,6 +99,7 @@ class Plan:
     photon: PhotonPlan = field(default_factory=PhotonPlan)
     eye: EyePlan = field(default_factory=EyePlan)
     seen: SeenPlan = field(default_factory=SeenPlan)
+    mesh: MeshPlan = field(default_factory=MeshPlan)
 
     @property
     def largest(self) -> int:
@@ -125,6 +137,7 @@ QUICK = replace(
         peer_photons=(1 << 17, 1 << 19, 1 << 21),
         validate=1 << 20,
     ),
+    mesh=MeshPlan(cells=512),
     eye=EyePlan(
         views=2,
         size=(320, 180),

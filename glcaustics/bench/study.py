@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 import glcaustics
-from glcaustics.bench import caustics_part, eye_part, photons_part, seen_part
+from glcaustics.bench import caustics_part, eye_part, mesh_part, photons_part, seen_part
 from glcaustics.bench.cells import Cells
 from glcaustics.bench.machine import code_key, commit, machine, versions
 from glcaustics.bench.marks import marks
@@ -50,12 +50,14 @@ class Study:
         self._cells = Cells(self.folder, self.plan.backend, self._count())
 
     def _count(self) -> int:
-        plan, counts = self.plan, {"caustics": 0, "photons": 0, "eye": 0, "seen": 0}
-        counts["caustics"] = caustics_part.count_steps(plan, self.peers)
-        counts["photons"] = photons_part.count_steps(plan, self.peers)
-        counts["eye"] = eye_part.count_steps(plan)
-        counts["seen"] = seen_part.count_steps(plan)
-        return sum(counts[part] for part in plan.parts)
+        counts = {
+            "caustics": caustics_part.count_steps(self.plan, self.peers),
+            "photons": photons_part.count_steps(self.plan, self.peers),
+            "mesh": mesh_part.count_steps(self.plan),
+            "eye": eye_part.count_steps(self.plan),
+            "seen": seen_part.count_steps(self.plan),
+        }
+        return sum(counts[part] for part in self.plan.parts)
 
     def run(self) -> dict[str, Any]:
         """Measure everything and return the report."""
@@ -63,6 +65,7 @@ class Study:
         runs = {
             "caustics": caustics_part.CausticsPart,
             "photons": photons_part.PhotonsPart,
+            "mesh": mesh_part.MeshPart,
             "eye": eye_part.EyePart,
             "seen": seen_part.SeenPart,
         }
@@ -86,7 +89,7 @@ class Study:
         """What made the report: command, commit, machine, packages, plan."""
         renderers = [found.get("gl_renderer"), *(r.get("gl_renderer") for r in found["rows"])]
         plan = {
-            name: dict(vars(value)) if name in ("timing", "photon", "eye", "seen") else value
+            name: dict(vars(value)) if name in ("timing", "photon", "eye", "seen", "mesh") else value
             for name, value in vars(self.plan).items()
         }
         return {

@@ -40,6 +40,7 @@ def all_tables(report: Report) -> Iterator[Table]:
     """Every table of a report, in the order of its parts; what was not measured is left out."""
     yield from equal_error_tables(report)
     yield from photon_tables(report)
+    yield from mesh_tables(report)
     yield from eye_tables(report)
     yield from seen_tables(report)
     yield from mark_tables(report)
@@ -147,6 +148,20 @@ def _stage_table(one: Mapping[str, Any]) -> Table:
     views = f"light views {first['view_size']}^2"
     note = f"{width}x{height}, {views}; ms by {first['clock']}; median of {first['frames']} frames"
     return Table(f"{one['scene']}: milliseconds and shares of a frame", head, rows, note)
+
+
+def mesh_tables(report: Report) -> Iterator[Table]:
+    """The displaced mesh, refined."""
+    if not (mesh := report.get("mesh")):
+        return
+    rows = []
+    for r in mesh["rows"]:
+        cells = [f"s={r['strength']:g}, mesh {r['mesh']}^2, map {r['map']}^2", f"{r['rrmse']:.4f}", f"{r['mae']:.4f}"]
+        rows.append([*cells, f"{r['bias']:+.2%}"])
+    noise = ", ".join(f"{name} {value:.2%}" for name, value in mesh["noise"].items())
+    orders = ", ".join(f"{order:.2f}" for order in mesh["orders"])
+    note = f"peer-pool, slanted light, divided by the means; noise of the beams {noise}; order without folds {orders}"
+    yield Table("The displaced mesh against beams", ("case", "rel. RMSE", "MAE", "bias"), rows, note)
 
 
 # ---------------------------------------------------------------- eye and light rays

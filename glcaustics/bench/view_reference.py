@@ -21,7 +21,7 @@ from glcaustics.scene.model import Camera, Scene
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
-LOOK_RAYS = 4  # per side of a pixel, to tell what it shows
+LOOK_RAYS = 2  # per side of a pixel, to tell what it shows
 
 
 @dataclass(frozen=True, eq=False)

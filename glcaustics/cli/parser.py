@@ -109,9 +109,13 @@ def _add_render_options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--samples",
         type=positive_int,
-        default=4,
         metavar="N",
-        help="shifted pictures averaged against aliasing (default: 4)",
+        help="shifted pictures averaged against aliasing (default: 4; 1 with --taa)",
+    )
+    command.add_argument(
+        "--taa",
+        action="store_true",
+        help="anti-aliasing over time: each frame is the mean over the last ones, followed along the motion",
     )
     command.add_argument("--seed", type=seed, default=0, metavar="N", help="seed of everything random (default: 0)")
     command.add_argument("--backend", choices=BACKENDS, default="auto", help="how to get OpenGL (default: auto)")
@@ -128,7 +132,7 @@ def _add_bench_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("-o", "--output", default="bench-report", metavar="DIR", help="default: bench-report")
     command.add_argument("--quick", action="store_true", help="four scenes, small, in about three minutes")
     command.add_argument(
-        "--parts", nargs="+", action="extend", metavar="NAME", help="caustics, photons, eye, seen (default: all)"
+        "--parts", nargs="+", action="extend", metavar="NAME", help="caustics, photons, mesh, eye, seen (default: all)"
     )
     for name, text in (("scenes", "of the built-in ones"), ("methods", "see methods"), ("qualities", "draft to high")):
         command.add_argument(f"--{name}", nargs="+", action="extend", metavar="NAME", help=text)
