@@ -8,8 +8,9 @@ import numpy as np
 
 from glcaustics.errors import UsageError
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
+from glcaustics.passes.eye_medium import EyeMediumFinder
 from glcaustics.passes.frame import FrameSetup, PassContext
-from glcaustics.passes.geometry import KIND_INDEX, SPECULAR_KINDS
+from glcaustics.passes.geometry import KIND_INDEX, SPECULAR_KINDS, boxes_of
 from glcaustics.passes.lighting import sky_uniforms
 from glcaustics.passes.raster import raster_uniforms
 from glcaustics.scene.model import OpticalKind
@@ -62,9 +63,17 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
             ),
             optional=("caustics.irradiance",),
             always_writes=("view.radiance", TODO) if cascade else (),
-            note=f"what water, glass and mirrors show; eye rays: {SOLVERS[solver]}",
+            note=f"what water, glass and mirrors show; eye rays: {SOLVERS[solver]}{_eye_at_start(setup)}",
         )
     )
+
+
+def _eye_at_start(setup: FrameSetup) -> str:
+    """For the plan's reader: what the eye is in at time 0. Every frame finds it anew (FrameState.eye_medium)."""
+    waters = {water.name: water for water in reversed(setup.sampled_instances)}
+    instances = [i for i in (*setup.static_instances, *waters.values()) if i.optical_kind in SPECULAR_KINDS]
+    medium = EyeMediumFinder().find(instances, boxes_of(instances), setup.scene.view_at(0.0).position_ws)
+    return f"; {medium.words}" if medium is not None else ""
 
 
 def _execute(ctx: PassContext) -> None:
@@ -73,8 +82,8 @@ def _execute(ctx: PassContext) -> None:
     outputs = ctx.locations(**OUTPUTS)
     target = ctx.target(*OUTPUTS.values(), depth="specular.depth")
     with device.timer("refraction/opaque"):
-        program = device.program("passes/refraction/opaque", outputs)
-        program.set_all(_textures(ctx))
+        program = device.program("passes/refraction/opaque", {**outputs, **_eye_defines(ctx)})
+        program.set_all({**_textures(ctx), **_eye_uniforms(ctx)})
         device.draw_fullscreen(program, target, depth_func="<=")
     with device.timer("refraction/first"):
         stage = {"NEWTON": int(solver in ("cascade", "newton")), "MARCH": 0 if solver == "cascade" else _MARCH[solver]}
@@ -106,6 +115,7 @@ def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
     kinds = ctx.setup.kinds()
     defines = {
         **outputs,
+        **_eye_defines(ctx),
         "FINAL": stage["FINAL"],
         "RETRY": stage.get("RETRY", 0),
         "REFLECTION": stage.get("REFLECTION", 0),
@@ -122,7 +132,6 @@ def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
     program = ctx.device.program("passes/refraction/refraction", defines)
     if one is not None:
         program.set(u_one_ior=one.ior_rgb(), u_one_sigma_a=one.sigma_a, u_one_transmission=one.transmission)
-    low, high = ctx.setup.scene_bounds_ws
     options = ctx.setup.options
     program.set_all(
         {
@@ -130,15 +139,32 @@ def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
             **raster_uniforms(ctx.frame.camera, ctx.setup.size),
             **sky_uniforms(ctx.setup),
             **_textures(ctx),
-            "u_bounds_min_ws": tuple(low),
-            "u_bounds_max_ws": tuple(high),
-            "u_bounds_diagonal_m": float(np.linalg.norm(high - low)),
+            **_eye_uniforms(ctx),
             "u_refraction_iterations": int(options["refraction_iterations"]),
             "u_refraction_steps": int(options["refraction_steps"]),
             "u_reflection_steps": int(options["reflection_steps"]),
         }
     )
     return program
+
+
+def _eye_defines(ctx: PassContext) -> dict[str, int]:
+    return {"HAS_EYE_MEDIUM": int(ctx.frame.eye_medium is not None)}
+
+
+def _eye_uniforms(ctx: PassContext) -> dict[str, Any]:
+    """The eye, the medium that it is in (uniforms of `eye_medium.glsl`), and the scene's box, where media end."""
+    low, high = ctx.setup.scene_bounds_ws
+    bounds = {
+        "u_bounds_min_ws": tuple(low),
+        "u_bounds_max_ws": tuple(high),
+        "u_bounds_diagonal_m": float(np.linalg.norm(high - low)),
+    }
+    medium = ctx.frame.eye_medium
+    if medium is None:
+        return {**ctx.frame.uniforms(), **bounds}
+    eye = {"sigma_a": tuple(medium.sigma_a), "ior": medium.ior, "solid": float(medium.solid + 1)}
+    return {**ctx.frame.uniforms(), **bounds, **{f"u_eye_{name}": value for name, value in eye.items()}}
 
 
 def _textures(ctx: PassContext) -> dict[str, Any]:

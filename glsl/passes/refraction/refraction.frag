@@ -10,6 +10,10 @@
 #include "passes/refraction/solid.glsl"
 #endif
 
+#if HAS_EYE_MEDIUM
+#include "passes/refraction/eye_medium.glsl"
+#endif
+
 uniform sampler2D t_specular_depth_m;
 uniform sampler2D t_specular_normal;
 
@@ -54,13 +58,22 @@ void main() {
         return;
 #endif
         Seen mirror = look_along(p, reflect(v, n));
+#if HAS_EYE_MEDIUM
+        mirror.radiance *= glc_eye_transmittance(v_uv, depth_m, u_bounds_min_ws, u_bounds_max_ws) * glc_transmittance(u_eye_sigma_a, mirror.distance_m);
+#endif
         mirror.radiance *= glc_fresnel_metal(object.base_color, cos_i);
         write_view(mirror, GLC_TODO_ALL);
         return;
     }
 #endif
+#if HAS_EYE_MEDIUM
+    bool from_dense = stored.w < 0.0 && (object.kind == GLC_INTERFACE || -stored.w == u_eye_solid);
+    float eta = from_dense ? 1.0 / object.ior.g : object.ior.g / u_eye_ior;
+    vec3 near = glc_eye_transmittance(v_uv, depth_m, u_bounds_min_ws, u_bounds_max_ws);
+#else
     bool from_dense = object.kind == GLC_INTERFACE && stored.w < 0.0;
     float eta = from_dense ? 1.0 / object.ior.g : object.ior.g;
+#endif
     float share = glc_fresnel_dielectric(cos_i, eta);
     vec3 reflected = reflect(v, n);
     vec3 reflection = share * glc_sky_radiance(reflected);
@@ -69,11 +82,19 @@ void main() {
 #if USE_MARCH && !RETRY
     {
         Seen seen = look_along(p, reflected);
+#if HAS_EYE_MEDIUM
+        seen.radiance *= glc_transmittance(u_eye_sigma_a, seen.distance_m);
+#else
         if (from_dense) seen.radiance *= glc_transmittance(object.sigma_a, seen.distance_m);
+#endif
         vec3 marched = mix(reflection, share * seen.radiance, smoothstep(REFLECT_FROM, REFLECT_TO, share));
 #if REFLECTION
         // Added to what the first stage wrote with the sky in the mirror.
+#if HAS_EYE_MEDIUM
+        seen.radiance = near * (marched - reflection);
+#else
         seen.radiance = glc_transmittance(object.sigma_a, absorbing_m) * (marched - reflection);
+#endif
         write_view(seen, GLC_TODO_NOTHING);
         return;
 #endif
@@ -90,8 +111,13 @@ void main() {
         GlcRasterRay ray;
         bool leaves = true;
 #if HAS_SOLID
+#if HAS_EYE_MEDIUM
+        if (object.kind == GLC_SOLID && !from_dense) {
+            leaves = solid_through(p, d, eta, object.sigma_a, tint);
+#else
         if (object.kind == GLC_SOLID) {
             leaves = solid_through(p, d, object.ior.g, object.sigma_a, tint);
+#endif
             ray = eye_ray(p, d);
         } else
 #endif
@@ -111,8 +137,14 @@ void main() {
         if (!leaves) through.status = GLC_VIEW_TIR;
         refraction = tint * through.radiance;
     }
+#if HAS_EYE_MEDIUM
+    // Beyond an interface its own medium; around a solid, the eye's; out of the eye's medium, air.
+    vec3 far_sigma_a = from_dense ? vec3(0.0) : (object.kind == GLC_INTERFACE ? object.sigma_a : u_eye_sigma_a);
+    through.radiance = near * (reflection + glc_transmittance(far_sigma_a, through.distance_m) * refraction);
+#else
     vec3 held = object.kind == GLC_INTERFACE ? glc_transmittance(object.sigma_a, absorbing_m) : vec3(1.0);
     through.radiance = from_dense ? held * (reflection + refraction) : reflection + held * refraction;
+#endif
     write_view(through, solved ? (share > REFLECT_FROM ? GLC_TODO_REFLECTION : GLC_TODO_NOTHING) : GLC_TODO_ALL);
 #endif
 }
