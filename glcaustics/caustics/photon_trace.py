@@ -19,7 +19,7 @@ from glcaustics.caustics.branches import BRANCH_CODE, REFLECT, SOLID, Branch, br
 from glcaustics.caustics.method import IRRADIANCE, NOISY_IRRADIANCE, CausticsMethod
 from glcaustics.errors import UsageError
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes import light_view
+from glcaustics.passes import depth_chain, light_view
 from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext
 from glcaustics.passes.light_views import LightView, light_uniforms
 from glcaustics.passes.raster import raster_uniforms
@@ -166,6 +166,11 @@ class PhotonTrace(CausticsMethod):
         for receiver in light.receivers.values():
             if any(branch.view == receiver.name for branch in branches):
                 light_view.declare_receiver(graph, setup, light, receiver)
+            if any(branch.view == receiver.name and branch.kind == REFLECT for branch in branches):
+                plane = light.resource(f"receiver.{receiver.name}.plane")
+                depth_chain.declare_over(
+                    graph, f"depth_chain.{receiver.name}", plane, receiver.view.size, light.resource("")
+                )
         if any(branch.kind == SOLID for branch in branches):
             light_view.declare_caster_back(graph, setup, light)
         else:
@@ -186,8 +191,7 @@ class PhotonTrace(CausticsMethod):
                 reads=(
                     light.resource("caster.position_ws"),
                     light.resource("caster.normal_ws"),
-                    light.resource(f"receiver.{branch.view}.position_ws"),
-                    light.resource(f"receiver.{branch.view}.normal_ws"),
+                    *_light_reads(light, branch).values(),
                     "gbuffer.plane",
                     *_march_reads(setup).values(),
                     *(back if branch.kind == SOLID else ()),
@@ -216,6 +220,8 @@ class PhotonTrace(CausticsMethod):
         program = ctx.device.program(f"{SHADERS}/trace", defines)
         if branch.kind == SOLID:
             program.set_all(self._solid_uniforms(ctx, light))
+        if branch.kind == REFLECT:
+            program.set(u_receiver_raster_from_world=view.raster_from_world())
         low, high = ctx.setup.bounds_ws
         program.set_all(
             {
@@ -226,10 +232,9 @@ class PhotonTrace(CausticsMethod):
                 **light_uniforms(light.light),
                 "t_caster_position": ctx.texture(light.resource("caster.position_ws")),
                 "t_caster_normal": ctx.texture(light.resource("caster.normal_ws")),
-                "t_receiver_position": ctx.texture(light.resource(f"receiver.{branch.view}.position_ws")),
-                "t_receiver_normal": ctx.texture(light.resource(f"receiver.{branch.view}.normal_ws")),
                 "t_plane": ctx.texture("gbuffer.plane"),
                 **{name: ctx.texture(resource) for name, resource in _march_reads(ctx.setup).items()},
+                **{name: ctx.texture(resource) for name, resource in _light_reads(light, branch).items()},
                 "t_objects": ctx.frame.gpu.objects,
                 "u_photon_grid": photon_grid(int(options["photons"]), light.caster),
                 "u_sequence": sequence(ctx.frame.index),
@@ -287,6 +292,16 @@ def _march_reads(setup: FrameSetup) -> dict[str, str]:
     if setup.options["march"] == "dda":
         return {"t_depth_m": "gbuffer.depth_m"}
     return {"t_bounds": "depth_chain.bounds"}
+
+
+def _light_reads(light: LightSetup, branch: Branch) -> dict[str, str]:
+    """Samplers and resources of the way through the light's view."""
+    receiver = f"receiver.{branch.view}"
+    if branch.kind == REFLECT:
+        bounds = light.resource(f"depth_chain.{branch.view}.bounds")
+        return {"t_light_plane": light.resource(f"{receiver}.plane"), "t_light_bounds": bounds}
+    position, normal = (light.resource(f"{receiver}.{name}") for name in ("position_ws", "normal_ws"))
+    return {"t_receiver_position": position, "t_receiver_normal": normal}
 
 
 def has_rough_casters(instances: Iterable[Instance]) -> bool:

@@ -17,23 +17,28 @@ def declare(graph: FrameGraph, setup: FrameSetup, layer: str = "") -> None:
 
     `layer`: suffix of an opaque layer of the G-buffer. Culled where no pass marches over it.
     """
-    fine, middle, coarse = (_cells(setup.size, texels) for texels in (4, 16, 64))
-    planes, finest, levels = f"gbuffer{layer}.plane", f"depth_chain{layer}.bounds_4", f"depth_chain{layer}.bounds"
+    declare_over(graph, f"depth_chain{layer}", f"gbuffer{layer}.plane", setup.size)
+
+
+def declare_over(graph: FrameGraph, chain: str, planes: str, size: tuple[int, int], suffix: str = "") -> None:
+    """The chain `<chain>.bounds<suffix>` over a texture of planes of any view. size: of that texture, texels."""
+    fine, middle, coarse = (_cells(size, texels) for texels in (4, 16, 64))
+    finest, levels = f"{chain}.bounds_4{suffix}", f"{chain}.bounds{suffix}"
     graph.add(
         PassDecl(
-            f"depth_chain{layer}.4",
+            f"{chain}.4{suffix}",
             {finest: TextureDesc("rg32f", fine, "1/m")},
             partial(_execute_finest, planes, finest),
             reads=(planes,),
             note="depth bounds of 4 x 4 texels",
         )
     )
-    size = (fine[0] + middle[0], max(fine[1], middle[1] + coarse[1]))
+    both = (fine[0] + middle[0], max(fine[1], middle[1] + coarse[1]))
     graph.add(
         PassDecl(
-            f"depth_chain{layer}.levels",
-            {levels: TextureDesc("rg32f", size, "1/m")},
-            partial(_execute_levels, finest, levels),
+            f"{chain}.levels{suffix}",
+            {levels: TextureDesc("rg32f", both, "1/m")},
+            partial(_execute_levels, finest, levels, size),
             reads=(finest,),
             note="depth bounds of 4 x 4, 16 x 16 and 64 x 64 texels, side by side",
         )
@@ -46,8 +51,7 @@ def _execute_finest(planes: str, finest: str, ctx: PassContext) -> None:
     ctx.device.draw_fullscreen(program, ctx.target(finest))
 
 
-def _execute_levels(finest: str, levels: str, ctx: PassContext) -> None:
-    size = ctx.setup.size
+def _execute_levels(finest: str, levels: str, size: tuple[int, int], ctx: PassContext) -> None:
     right, above = _cells(size, 4)[0], _cells(size, 16)[1]
     for texels, origin in ((4, (0, 0)), (16, (right, 0)), (64, (right, above))):
         program = ctx.device.program("passes/depth_chain/levels", {"STEP": texels // 4})

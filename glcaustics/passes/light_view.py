@@ -40,7 +40,7 @@ def _draw_caster(ctx: PassContext, light: LightSetup, position: str, normal: str
     assert light.caster is not None
     target = ctx.target(position, normal, depth=depth)
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-    outputs = {**ctx.locations(POSITION=position, NORMAL=normal), "BACK": 0, "CLIP": 0}
+    outputs = {**ctx.locations(POSITION=position, NORMAL=normal), "HAS_PLANE": 0, "BACK": 0, "CLIP": 0}
     occluder = ctx.device.program(SHADER, {**outputs, "OCCLUDER": 1})
     shown = ctx.device.program(SHADER, {**outputs, "OCCLUDER": 0})
     gpu = ctx.frame.gpu
@@ -80,27 +80,27 @@ def _draw_back(ctx: PassContext, light: LightSetup, front: str, position: str, n
     assert light.caster is not None
     target = ctx.target(position, normal, depth=depth)
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-    program = ctx.device.program(
-        SHADER, {**ctx.locations(POSITION=position, NORMAL=normal), "BACK": 1, "OCCLUDER": 0, "CLIP": 0}
-    )
+    outputs = {**ctx.locations(POSITION=position, NORMAL=normal), "HAS_PLANE": 0}
+    program = ctx.device.program(SHADER, {**outputs, "BACK": 1, "OCCLUDER": 0, "CLIP": 0})
     program.set(t_front_position=ctx.texture(front), u_light=light.caster.light_vec4)
     _draw_kind(ctx, light.caster, program, target, ctx.frame.gpu.select(OpticalKind.SOLID), cull="front")
 
 
 def declare_receiver(graph: FrameGraph, setup: FrameSetup, light: LightSetup, receiver: ReceiverView) -> None:
-    """Position and normal of the first opaque surface, as if there were no specular ones."""
+    """The first opaque surface, as if there were no specular ones: position, normal, tangent plane in raster space."""
     size = receiver.view.size
-    names = ("position_ws", "normal_ws", "depth")
-    position, normal, depth = (light.resource(f"receiver.{receiver.name}.{n}") for n in names)
+    names = ("position_ws", "normal_ws", "plane", "depth")
+    position, normal, plane, depth = (light.resource(f"receiver.{receiver.name}.{n}") for n in names)
     graph.add(
         PassDecl(
             f"receiver_view.{receiver.name}{light.resource('')}",
             {
                 position: TextureDesc("rgba32f", size, "m"),
                 normal: TextureDesc("rgba32f", size),
+                plane: TextureDesc("rgba32f", size, "1/m"),
                 depth: TextureDesc("depth24", size),
             },
-            lambda ctx: _draw_receiver(ctx, receiver, position, normal, depth),
+            lambda ctx: _draw_receiver(ctx, receiver, (position, normal, plane), depth),
             always_writes=(depth,),
             note=f"opaque surfaces where caustics can land, seen from {RECEIVER_WORDS[receiver.base]}",
         )
@@ -110,20 +110,30 @@ def declare_receiver(graph: FrameGraph, setup: FrameSetup, light: LightSetup, re
 RECEIVER_WORDS = {BESIDE: "the light", BELOW: "the light as refracted"}
 
 
-def _draw_receiver(ctx: PassContext, receiver: ReceiverView, position: str, normal: str, depth: str) -> None:
-    target = ctx.target(position, normal, depth=depth)
+def _draw_receiver(ctx: PassContext, receiver: ReceiverView, colors: tuple[str, str, str], depth: str) -> None:
+    target = ctx.target(*colors, depth=depth)
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-    outputs = ctx.locations(POSITION=position, NORMAL=normal)
+    outputs = ctx.locations(**dict(zip(("POSITION", "NORMAL", "PLANE"), colors, strict=True)))
     clip = receiver.clip_plane is not None
     program = ctx.device.program(SHADER, {**outputs, "BACK": 0, "OCCLUDER": 0, "CLIP": int(clip)})
     if receiver.clip_plane is not None:
         program.set(u_clip_plane=receiver.clip_plane)
-    _draw_kind(ctx, receiver.view, program, target, ctx.frame.gpu.select(OpticalKind.DIFFUSE))
+    items = ctx.frame.gpu.select(OpticalKind.DIFFUSE)
+    _draw_kind(ctx, receiver.view, program, target, items, planes=bool(outputs["HAS_PLANE"]))
 
 
 def _draw_kind(
-    ctx: PassContext, view: LightView, program: Program, target: Any, items: list[DrawItem], cull: str | None = None
+    ctx: PassContext,
+    view: LightView,
+    program: Program,
+    target: Any,
+    items: list[DrawItem],
+    *,
+    cull: str | None = None,
+    planes: bool = False,
 ) -> None:
-    for matrix, viewport in zip(view.matrices, view.viewports(), strict=True):
+    for face, (matrix, viewport) in enumerate(zip(view.matrices, view.viewports(), strict=True)):
         program.set(u_clip_from_world=matrix)
+        if planes:
+            program.set(u_raster_from_world=view.raster_from_world(face))
         ctx.frame.gpu.draw(program, target, items, viewport=viewport, cull=cull)

@@ -67,6 +67,19 @@ class LightView:
             f"u_{prefix}_light": self.light_vec4,
         }
 
+    def raster_from_world(self, face: int = 0) -> FloatArray:
+        """(4, 4) column-vector form: world to X, Y, S, W with texel = XY / W of the whole texture and s = S / W.
+
+        s is the affine depth of `common/raster_ray.glsl`: 1 / depth; directional: minus the depth behind near_m.
+        """
+        x0, y0, width, height = self.viewports()[face]
+        m = np.asarray(self.matrices[face], np.float64)
+        x, y = (0.5 * n * (m[k] + m[3]) + at * m[3] for k, n, at in ((0, width, x0), (1, height, y0)))
+        s = np.array([0.0, 0.0, 0.0, 1.0])
+        if self.light.kind is LightKind.DIRECTIONAL:
+            s = np.array([*(-self.forward_ws), self.near_m])
+        return np.stack([x, y, s, m[3]])
+
     def viewports(self) -> list[tuple[int, int, int, int]]:
         """Viewport (x, y, width, height) of each face."""
         if self.faces == 1:

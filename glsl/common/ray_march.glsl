@@ -28,14 +28,16 @@ bool glc_march_settle(sampler2D t_plane, GlcRasterRay ray, float reach, inout Gl
     return false;
 }
 
-// One step a pixel of the longer axis. t_depth: r32f depth in metres, 0 = nothing.
-GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, GlcRasterRay ray, int max_steps) {
+// One step a pixel of the longer axis. t_depth: r32f depth in metres, 0 = nothing. in_view: the ray was in front of all surfaces up to
+// its end: whoever looks sees all of it, so that nothing else can be in its way.
+GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, GlcRasterRay ray, int max_steps, out bool in_view) {
     GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_NOTHING, 0);
     float pixels = max(max(abs(ray.step.x), abs(ray.step.y)) * ray.u_screen, 1.0);
     float du = ray.u_screen / pixels;
     vec2 last = vec2(textureSize(t_depth, 0)) - 1.0;
     int count = min(int(ceil(pixels)), max_steps);
     bool front = true;
+    in_view = true;
     vec3 p = ray.start;
     int i = 0;
     for (int candidate = 0; candidate < 256 && i <= count; ++candidate) {
@@ -52,11 +54,17 @@ GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, 
         solve.iterations = i;
         if (i > count) break;
         if (glc_march_settle(t_plane, ray, 2.5 * du, solve)) return solve;
+        in_view = false;
         i += 1;
     }
     if (ray.u_screen < 1.0) solve.status = GLC_SOLVE_OFFSCREEN;
     else if (!front) solve.status = GLC_SOLVE_HIDDEN;
     return solve;
+}
+
+GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, GlcRasterRay ray, int max_steps) {
+    bool in_view;
+    return glc_march_dda(t_depth, t_plane, orthographic, ray, max_steps, in_view);
 }
 
 // Where the bounds of a cell of 4 x 4, 16 x 16 or 64 x 64 texels lie in their texture: the finest level at the left, beside it the
@@ -71,7 +79,8 @@ ivec2 glc_bounds_texel(vec2 index, float cell, vec2 size) {
 // finds. Where that finds nothing, it takes the first texel whose plane the ray crosses although no centre's depth told (blades seen
 // edge-on). Two loops take turns, since a software renderer runs all of a loop's body for every pixel: over cells, one fetch a step,
 // and over the texels of the one cell that could not be skipped.
-GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRasterRay ray, int max_steps) {
+GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRasterRay ray, int max_steps, out bool in_view) {
+    in_view = true;
     GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_DIVERGED, 0);
     vec3 crossed = vec3(-1.0);   // u and texel
     vec2 size = vec2(textureSize(t_plane, 0));
@@ -135,6 +144,7 @@ GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRaster
             float next = over && meets && flat_cell ? clamp(ceil(met / du), at + 1.0, leave) : at + 1.0;
             at = again ? at : next;
             ended = at > count;
+            in_view = in_view && (front || again || hit);
             if (hit || (!again && (at >= leave || ended))) break;
         }
         if (hit) break;
@@ -147,6 +157,11 @@ GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRaster
     solve.status = GLC_SOLVE_DIVERGED;
     if (ended) solve.status = ray.u_screen < 1.0 ? GLC_SOLVE_OFFSCREEN : (front ? GLC_SOLVE_NOTHING : GLC_SOLVE_HIDDEN);
     return solve;
+}
+
+GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRasterRay ray, int max_steps) {
+    bool in_view;
+    return glc_march_hierarchical(t_bounds, t_plane, ray, max_steps, in_view);
 }
 
 // Whether the way to a hit of Newton's method is clear: ray points on it against the nearest s of 4 x 4 texels around them. False:

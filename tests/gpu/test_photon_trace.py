@@ -20,9 +20,9 @@ from glcaustics.denoise import svgf
 from glcaustics.optics.fresnel import fresnel_dielectric
 from glcaustics.optics.receivers import PlaneGrid
 from glcaustics.optics.reference import BeamSettings, reference_map
-from glcaustics.scene.model import Camera, Scene
+from glcaustics.scene.model import Camera, Light, LightKind, Scene
 from glcaustics.scene.water import Wave, WaveSurface, make_water
-from tests.gpu.feature_scenes import WATER, box, from_above, plane, scene_of, sheet, sun
+from tests.gpu.feature_scenes import WATER, box, from_above, lamp, plane, scene_of, sheet, sun
 from tests.gpu.physics_scenes import CASES, PhysicsCase
 
 pytestmark = pytest.mark.gpu
@@ -130,6 +130,28 @@ def test_reflective_caustics_where_the_light_does_not_see() -> None:
         seen, (128, 128), "caustic_map", backend=BACKEND, aovs=("caustic_irradiance",), specular_view=False
     ) as other:
         assert green(other.render()).mean() < 0.1 * expected
+
+
+@pytest.mark.parametrize("light", [sun(45.0), lamp((-0.9, 0.9, 0.0))], ids=["sun", "lamp"])
+def test_no_photon_flies_through_a_thin_strip_that_only_the_light_sees(light: Light) -> None:
+    """A strip of 2 mm by 4 cm, out of the picture, stands in the reflected light: its shadow on the slab is dark. To the
+    lamp the scene is a cube.
+    """
+    scene, height, _ = hidden_ceiling()
+    strip = box("strip", (0.002, 0.04, 3.0), (0.3, 0.1, 0.0))
+    below = Camera.look_at((1.6, 0.2, 0.0), (1.6, height, 0.0), (0.0, 0.0, 1.0), yfov_rad=0.8)
+    images = []
+    for instances in (scene.instances, (*scene.instances, strip)):
+        seen = replace(scene, instances=instances, camera=below, lights=(light,))
+        with open_renderer(seen, photons=400_000, denoise=False, map_size=1024) as renderer:
+            images.append(green(renderer.render())[32:96].mean(axis=0))
+    run = 1.0 if light.kind is LightKind.DIRECTIONAL else 1.2  # metres along x for one of height, at the strip
+    off_px = (0.3 + run * (height - 0.1) - 1.6) / ((height - 0.2) * np.tan(0.4)) * 64.0
+    middle = round(64.0 + float(np.asarray(below.world_from_camera)[0, 0]) * off_px)
+    lit, shadow = (float(image[middle - 1 : middle + 1].mean()) for image in images)
+    print(f"irradiance {lit:.5f}, in the strip's shadow {shadow:.5f}")
+    assert lit > 0.0
+    assert shadow < 0.05 * lit
 
 
 def test_the_ceiling_of_flooded_cornell_against_beams() -> None:

@@ -85,12 +85,12 @@ bool photon_is_seen(vec3 p, vec3 normal_ws, vec3 d, float slack_m, inout PhotonL
     return false;
 }
 
-// Part of the ray within the picture and in front of the eye.
-vec2 photon_clip(vec3 o, vec3 d, float t0, float t1) {
-    vec4 q = u_raster_from_world * vec4(o, 1.0), dq = u_raster_from_world * vec4(d, 0.0);
-    float near_w = u_camera_lens.z != 0.0 ? 0.5 : 1e-3 * max(q.w, q.w + t1 * dq.w);
-    float value[5] = float[5](q.w - near_w, q.x, u_raster_size.x * q.w - q.x, q.y, u_raster_size.y * q.w - q.y);
-    float slope[5] = float[5](dq.w, dq.x, u_raster_size.x * dq.w - dq.x, dq.y, u_raster_size.y * dq.w - dq.y);
+// Part of the ray within a view's picture and in front of it, metres along the ray; y <= x: none.
+vec2 photon_clip(mat4 raster_from_world, vec2 size, bool orthographic, vec3 o, vec3 d, float t0, float t1) {
+    vec4 q = raster_from_world * vec4(o, 1.0), dq = raster_from_world * vec4(d, 0.0);
+    float near_w = orthographic ? 0.5 : 1e-3 * max(q.w, q.w + t1 * dq.w);
+    float value[5] = float[5](q.w - near_w, q.x, size.x * q.w - q.x, q.y, size.y * q.w - q.y);
+    float slope[5] = float[5](dq.w, dq.x, size.x * dq.w - dq.x, dq.y, size.y * dq.w - dq.y);
     for (int i = 0; i < 5; ++i) {
         if (abs(slope[i]) < 1e-20) { if (value[i] < 0.0) return vec2(1.0, 0.0); continue; }
         float at = -value[i] / slope[i];
@@ -99,16 +99,17 @@ vec2 photon_clip(vec3 o, vec3 d, float t0, float t1) {
     return vec2(t0, t1);
 }
 
-// Marches from t0 on in the camera's view.
-void photon_march(vec3 o, vec3 d, float t0, float t1, inout PhotonLanding landing) {
-    vec2 part = photon_clip(o, d, t0, t1);
+// Marches from t0 on in the camera's view. True where the eye sees all of the ray from o to where that ends: what it found is certain.
+bool photon_march(vec3 o, vec3 d, float t0, float t1, inout PhotonLanding landing) {
+    bool orthographic = u_camera_lens.z != 0.0, in_view;
+    vec2 part = photon_clip(u_raster_from_world, u_raster_size, orthographic, o, d, t0, t1);
     landing.status = PHOTON_OUTSIDE;
-    if (part.y <= part.x) return;
+    if (part.y <= part.x) return false;
     GlcRasterRay ray = glc_raster_ray(u_raster_from_world, u_raster_size, o + part.x * d, d, part.y - part.x);
 #if DDA
-    GlcSolve solve = glc_march_dda(t_depth_m, t_plane, u_camera_lens.z != 0.0, ray, u_view_steps);
+    GlcSolve solve = glc_march_dda(t_depth_m, t_plane, orthographic, ray, u_view_steps, in_view);
 #else
-    GlcSolve solve = glc_march_hierarchical(t_bounds, t_plane, ray, u_view_steps);
+    GlcSolve solve = glc_march_hierarchical(t_bounds, t_plane, ray, u_view_steps, in_view);
 #endif
     landing.lookups += solve.iterations;
     if (solve.status == GLC_SOLVE_HIT) {
@@ -126,34 +127,44 @@ void photon_march(vec3 o, vec3 d, float t0, float t1, inout PhotonLanding landin
         landing.px = texel;
         landing.per_m2 = photon_per_m2(texel, stored.w, photon_plane(stored).xyz);
         landing.status = PHOTON_BY_EYE_VIEW;
+        return in_view && part.x <= 0.0;
     } else if (solve.status == GLC_SOLVE_HIDDEN) {
         landing.status = PHOTON_UNSEEN;
     } else if (solve.status == GLC_SOLVE_DIVERGED) {
         landing.status = PHOTON_UNRESOLVED;
     }
+    return false;
+}
+
+// Carries the light's end of the ray on to the tangent planes that the eye sees, where the light's view is the coarser one: Newton's
+// method. True where it is settled: the photon landed, or the eye does not see its end. False: it floats before what the eye sees.
+bool photon_refine(vec3 o, vec3 d, GlcHit hit, float slack, inout PhotonLanding landing) {
+    vec3 p = hit.position_ws, n = hit.normal_ws;
+    landing.t = hit.t;
+    for (int i = 0; i < 4; ++i) {
+        if (!photon_is_seen(p, n, d, slack, landing)) break;
+        n = landing.plane.xyz;
+        float gap = dot(n, p) + landing.plane.w, towards = -dot(n, d);
+        slack = abs(gap) / max(towards, 1e-3);
+        if (slack < 0.1 * landing.width_m || i == 3) break;
+        landing.t += gap / max(towards, 1e-3);
+        p = o + landing.t * d;
+    }
+    return landing.status != 0;
+}
+
+// Neither view knows. In front of all that the light sees, up to the end of the receivers, means out of the scene.
+void photon_give_up(GlcHit hit, inout PhotonLanding landing) {
+    if (hit.status == GLC_LEFT) landing.status = PHOTON_LEFT;
+    else if (landing.status != PHOTON_UNRESOLVED) landing.status = PHOTON_HIDDEN;
 }
 
 // hit: the light view's answer on o + t d; slack_m: how exactly it knows surfaces (half a texel); t_max: end of the receivers' box.
 PhotonLanding photon_land(vec3 o, vec3 d, GlcHit hit, float slack_m, float t_max) {
     PhotonLanding landing = PhotonLanding(vec2(0.0), 0.0, hit.t, 0, 0, vec4(0.0), 0.0);
     bool found = hit.status > 0;
-    vec3 p = hit.position_ws, n = hit.normal_ws;
-    float slack = slack_m;
-    // Where the light's view is the coarser one, its end is carried on to the tangent planes that the eye sees: Newton's method.
-    for (int i = 0; found && i < 4; ++i) {
-        if (!photon_is_seen(p, n, d, slack, landing)) break;
-        n = landing.plane.xyz;
-        float gap = dot(n, p) + landing.plane.w, towards = -dot(n, d);
-        slack = abs(gap) / max(towards, 1e-3);
-        if (slack < 0.1 * landing.width_m || i == 3) return landing;
-        landing.t += gap / max(towards, 1e-3);
-        p = o + landing.t * d;
-    }
-    if (found && landing.status != 0) return landing;
+    if (found && photon_refine(o, d, hit, slack_m, landing)) return landing;
     photon_march(o, d, found ? max(hit.t - 4.0 * slack_m, 0.0) : 0.0, t_max, landing);
-    if (landing.status > 0 || found) return landing;
-    // Neither view knows. In front of all that the light sees, up to the end of the receivers, means out of the scene.
-    if (hit.status == GLC_LEFT) landing.status = PHOTON_LEFT;
-    else if (landing.status != PHOTON_UNRESOLVED) landing.status = PHOTON_HIDDEN;
+    if (landing.status <= 0 && !found) photon_give_up(hit, landing);
     return landing;
 }

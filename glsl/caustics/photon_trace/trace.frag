@@ -11,10 +11,14 @@
 #include "interface/light.glsl"
 #include "interface/objects.glsl"
 #include "caustics/photon_trace/sample.glsl"
+#if BRANCH == GLC_REFLECT
+#include "caustics/photon_trace/reflected.glsl"
+#else
 #include "caustics/photon_trace/land.glsl"
-
 uniform sampler2D t_receiver_position;
 uniform sampler2D t_receiver_normal;
+#endif
+
 uniform vec3 u_bounds_min_ws;      // box around all receivers
 uniform vec3 u_bounds_max_ws;
 #if BRANCH == GLC_IN_AND_OUT
@@ -135,17 +139,17 @@ void main() {
 
     float t_max = glc_box_exit(p, ray, u_bounds_min_ws, u_bounds_max_ws);
     if (t_max <= 0.0) { o_landing.w = float(PHOTON_LEFT); o_flux = vec4(flux, iterations); return; }
-    GlcView receiver_view = glc_receiver_view();
 #if BRANCH == GLC_REFLECT
-    // A reflected ray leaves the light's direction altogether: the fixed point has no reason to contract there.
-    GlcHit hit = glc_intersect_march(t_receiver_position, t_receiver_normal, receiver_view, p, ray, t_max, u_march_steps);
+    PhotonLanding landing = photon_land_reflected(p, ray, t_max);
 #else
+    GlcView receiver_view = glc_receiver_view();
     GlcHit hit = glc_intersect(t_receiver_position, t_receiver_normal, receiver_view, p, ray, t_max, ESTIMATE, u_max_iterations,
                                u_march_steps);
-#endif
     float slack_m = 0.5 * glc_texel_width(receiver_view, hit.status > 0 ? hit.position_ws : p);
     PhotonLanding landing = photon_land(p, ray, hit, slack_m, t_max);
-    iterations += float(hit.iterations + landing.lookups);
+    iterations += float(hit.iterations);
+#endif
+    iterations += float(landing.lookups);
 #if HAS_MIRROR
     // Light that meets a second mirror on its way is another path (L S S D), which the photons do not follow.
     if (landing.status > 0 && object.kind == GLC_MIRROR) {

@@ -18,14 +18,28 @@ uniform vec4 u_light;
 uniform vec4 u_clip_plane;   // world space; what lies on its negative side is not drawn
 #endif
 
+#if HAS_PLANE
+uniform mat4 u_raster_from_world;   // of this face: see common/raster_ray.glsl
+#endif
+
 #if HAS_POSITION
 layout(location = LOCATION_POSITION) out vec4 o_position_ws;
 #endif
 #if HAS_NORMAL
 layout(location = LOCATION_NORMAL) out vec4 o_normal_ws;
 #endif
+#if HAS_PLANE
+layout(location = LOCATION_PLANE) out vec4 o_plane;   // tangent plane in raster space (common/raster_ray.glsl): g, c; w: depth
+#endif
 
 void main() {
+#if HAS_PLANE
+    // Derivatives before any discard. The triangle's own plane: smooth normals would not agree with the depths beside it.
+    vec4 raster = u_raster_from_world * vec4(v_position_ws, 1.0);
+    float s = raster.z / raster.w;
+    vec2 g = vec2(dFdx(s), dFdy(s));
+    o_plane = vec4(g, s - dot(g, gl_FragCoord.xy), s > 0.0 ? raster.w : -s);
+#endif
 #if CLIP
     if (dot(u_clip_plane, vec4(v_position_ws, 1.0)) < 0.0) discard;
 #endif
