@@ -75,7 +75,6 @@ class CausticMap(LightMapMethod):
             "max_radius": 48.0,
         },
     }
-    cores_add = True
     option_help: ClassVar[Mapping[str, str]] = {
         **LightMapMethod.option_help,
         "naive_flux": "the paper's N.L / V flux instead of the exact one, as a baseline (true, false)",

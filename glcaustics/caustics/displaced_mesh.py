@@ -19,25 +19,27 @@ from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext, Receive
 from glcaustics.passes.runner import PlanRunner
 
 SHADERS = "caustics/displaced_mesh"
+WARPED_STAGES = ("vertex", "leftover")
 
 
 class DisplacedMesh(LightMapMethod):
     """See the module."""
 
     name = "displaced_mesh"
+    warps = True
     summary = "a mesh over water, glass and mirrors as the light sees them, drawn where its light lands"
     paper = "Mayer, Assarsson, Sintorn 2026: Ultrafast Screen-Space Refractions and Caustics via Newton's Method"
     ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         quality: {
             "caster_size": caster, "map_size": map_size, "max_iterations": iterations, "march_steps": steps,
-            "gather_taps": taps, "internal_bounces": bounces,
+            "gather_taps": taps, "internal_bounces": bounces, "max_radius": radius,
         }
-        for quality, caster, map_size, iterations, steps, taps, bounces in (
-            ("draft", 96, 256, 6, 12, 1, 0),
-            ("low", 160, 384, 8, 16, 1, 1),
-            ("medium", 256, 768, 10, 24, 2, 2),
-            ("high", 512, 1024, 12, 48, 4, 4),
-            ("reference", 1536, 2048, 16, 96, 6, 8),
+        for quality, caster, map_size, iterations, steps, taps, bounces, radius in (
+            ("draft", 96, 256, 6, 12, 1, 0, 16.0),
+            ("low", 160, 384, 8, 16, 1, 1, 24.0),
+            ("medium", 256, 768, 10, 24, 2, 2, 32.0),
+            ("high", 512, 1024, 12, 48, 4, 4, 48.0),
+            ("reference", 1536, 2048, 16, 96, 6, 8, 48.0),
         )
     }  # fmt: skip
     option_help: ClassVar[Mapping[str, str]] = {
@@ -50,7 +52,7 @@ class DisplacedMesh(LightMapMethod):
     defaults: ClassVar[Mapping[str, Any]] = {
         **LightMapMethod.defaults,
         "fold_width": 2.0,
-        "change": 0.1,
+        "change": 0.3,
         "sharpen": True,
     }
     ranges: ClassVar[Mapping[str, tuple[float, float]]] = {
@@ -67,9 +69,9 @@ class DisplacedMesh(LightMapMethod):
         self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, receiver: ReceiverView, branches: list[Branch]
     ) -> None:
         for branch in branches:
-            self._declare_grid(graph, light, branch)
+            self._declare_grid(graph, light, receiver, branch)
         textures = [b.resource(n) for b in branches for n in ("projected", "vertex", "cell", "drawn", "splat", "conic")]
-        desc = TextureDesc("rgba32f", receiver.view.size, "lm")
+        desc = self.map_desc(light, receiver)
         final = self.map_resource(light, receiver)
         raw = light.resource(f"{self.name}.{receiver.name}.raw") if setup.options["sharpen"] else final
         graph.add(
@@ -77,7 +79,12 @@ class DisplacedMesh(LightMapMethod):
                 f"{self.name}.draw.{receiver.name}{light.resource('')}",
                 {raw: desc},
                 lambda ctx: self._draw(ctx, light, receiver, branches, raw),
-                reads=(*textures, *(b.flux for b in branches), *(b.landing for b in branches)),
+                reads=(
+                    *textures,
+                    *(b.flux for b in branches),
+                    *(b.landing for b in branches),
+                    *self.warp_reads(light, receiver),
+                ),
                 note="the displaced meshes added up in the caustic map",
             )
         )
@@ -92,7 +99,7 @@ class DisplacedMesh(LightMapMethod):
                 )
             )
 
-    def _declare_grid(self, graph: FrameGraph, light: LightSetup, branch: Branch) -> None:
+    def _declare_grid(self, graph: FrameGraph, light: LightSetup, receiver: ReceiverView, branch: Branch) -> None:
         """Five small passes over the grid of vertices."""
         assert light.caster is not None
         size = light.caster.size
@@ -105,16 +112,16 @@ class DisplacedMesh(LightMapMethod):
                 PassDecl(
                     branch.pass_name(stage),
                     {name: TextureDesc("rgba32f", size, unit) for name in writes},
-                    lambda ctx: self._grid_pass(ctx, light, branch, stage, writes),
+                    lambda ctx: self._grid_pass(ctx, light, receiver, branch, stage, writes),
                     reads=reads,
                     note=note,
                 )
             )
 
         caster = (light.resource("caster.position_ws"), light.resource("caster.normal_ws"))
-        landing = branch.landing
+        landing, warp = branch.landing, self.warp_reads(light, receiver)
         add("project", (projected,), (landing, *caster), "texel", "landing points in texels of the map")
-        add("vertex", (exact, axes), (projected, landing), "texel", "signed determinant of the light map")
+        add("vertex", (exact, axes), (projected, landing, *warp), "texel", "signed determinant of the light map")
         add("interpolant", (vertex,), (exact,), "texel", "determinant made fit to be interpolated")
         add(
             "cell",
@@ -126,7 +133,7 @@ class DisplacedMesh(LightMapMethod):
         add(
             "leftover",
             (branch.splat, branch.conic, drawn),
-            (projected, vertex, axes, weight, branch.flux),
+            (projected, vertex, axes, weight, branch.flux, *warp),
             "texel",
             "flux that is not drawn",
         )
@@ -134,9 +141,15 @@ class DisplacedMesh(LightMapMethod):
     # -- execution ----------------------------------------------------------------------------------------------------
 
     def _grid_pass(
-        self, ctx: PassContext, light: LightSetup, branch: Branch, stage: str, writes: tuple[str, ...]
+        self,
+        ctx: PassContext,
+        light: LightSetup,
+        receiver: ReceiverView,
+        branch: Branch,
+        stage: str,
+        writes: tuple[str, ...],
     ) -> None:
-        program = self._program(ctx, light, branch, stage)
+        program = self._program(ctx, light, receiver, branch, stage)
         textures: dict[str, tuple[str, ...]] = {
             "project": (),
             "vertex": ("projected",),
@@ -164,17 +177,25 @@ class DisplacedMesh(LightMapMethod):
                 u_sigma=SPLAT_SIGMA,
                 u_max_radius=float(ctx.setup.options["max_radius"]),
             )
+            if receiver.view.faces == 1:
+                size = self.map_desc(light, receiver).size
+                program.set(u_map_size=(float(size[0]), float(size[1])))
         ctx.device.draw_fullscreen(program, ctx.target(*writes))
 
-    @staticmethod
-    def _program(ctx: PassContext, light: LightSetup, branch: Branch, stage: str) -> Program:
+    def _program(
+        self, ctx: PassContext, light: LightSetup, receiver: ReceiverView, branch: Branch, stage: str
+    ) -> Program:
         """The program of a stage, with what it needs of the views."""
         assert light.caster is not None
-        view = light.receivers[branch.map_view].view
+        view = receiver.view
         defines = {"RECEIVER_FACES": view.faces}
         if stage == "vertex":
             defines["CASTER_FACES"] = light.caster.faces
+        if stage in WARPED_STAGES:
+            defines["WARP"] = self.warp_define(light, receiver)
         program = ctx.device.program(f"{SHADERS}/{stage}", defines)
+        if stage in WARPED_STAGES:
+            self.set_warp(program, ctx, light, receiver)
         program.set_all(view.uniforms("receiver"))
         if view.faces == 6 and stage != "project":
             program.set(t_landing=ctx.texture(branch.landing))
@@ -187,12 +208,12 @@ class DisplacedMesh(LightMapMethod):
         target = ctx.target(raw)
         target.clear(0.0, 0.0, 0.0, 0.0)
         width, height = light.caster.size
-        view = receiver.view
+        view, size = receiver.view, self.map_desc(light, receiver).size
         for branch in branches:
-            program = self._program(ctx, light, branch, "mesh")
+            program = self._program(ctx, light, receiver, branch, "mesh")
             program.set_all({f"t_{name}": ctx.texture(branch.resource(name)) for name in ("vertex", "cell", "drawn")})
-            program.set(u_width=width, u_map_size=(float(view.size[0]), float(view.size[1])))
-            for face, viewport in enumerate(view.viewports()):
+            program.set(u_width=width, u_map_size=(float(size[0]), float(size[1])))
+            for face, viewport in enumerate(view.viewports() if view.faces == 6 else [(0, 0, *size)]):
                 if view.faces == 6:
                     program.set(u_face=face, t_projected=ctx.texture(branch.resource("projected")))
                 count = 2 * (width - 1) * (height - 1)

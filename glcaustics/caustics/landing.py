@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from glcaustics.caustics.branches import branches_of, read_rgba32f
+from glcaustics.caustics.map_warp import MapWarp, fit_warp
 from glcaustics.gpu import Device
 from glcaustics.graph import FrameGraph
 from glcaustics.passes.frame import CORE, FrameSetup, FrameState, LightSetup, ReceiverView, receiver_views
@@ -39,11 +40,11 @@ AIR = {False: 0.02, True: 0.06}  # border of the window; more where the water mo
 
 def fit_receivers(
     method: LightMapMethod, device: Device, setup: FrameSetup, light: LightSetup, frame: FrameState
-) -> dict[str, float]:
+) -> tuple[dict[str, float], dict[str, MapWarp]]:
     """Set the windows of `light.receivers` so that they hold the landing light.
 
     Returns:
-        Share of the light that lands, by branch kind.
+        Share of the light that lands, by branch kind; and the warps of the maps that get one, by the view's name.
     """
     everything = setup.instances()
     casters = points_of([i for i in everything if i.optical_kind is not OpticalKind.DIFFUSE])
@@ -66,13 +67,20 @@ def fit_receivers(
                 view = _window(seen_from, points, weights, texels, setup.is_animated, receivers, boxes)
                 coarse_light.receivers[name] = replace(coarse_light.receivers[name], view=view)
     light.receivers = coarse_light.receivers
+    warps: dict[str, MapWarp] = {}
     for name, (points, weights) in landed.items():
         around = coarse_light.receivers[name]
+        if method.warps:
+            if len(points) and around.view.faces == 1:
+                u, v = _window_coordinates(around.view, points)
+                warp = fit_warp(u, v, weights, around.view.size)
+                warps |= {name: warp} if warp is not None else {}
+            continue
         for cut in CORE_CUTS:
             core = _core(around, points, weights, cut, int(setup.options["map_size"]), receivers, boxes)
             if core is not None:
                 light.receivers[core.name] = around = core
-    return shares
+    return shares, warps
 
 
 def _core(

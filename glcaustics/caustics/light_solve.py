@@ -14,12 +14,13 @@ import numpy as np
 
 from glcaustics.caustics.branches import BRANCH_CODE, REFLECT, SOLID, Branch, branches_of, solve_statistics
 from glcaustics.caustics.landing import fit_receivers
+from glcaustics.caustics.map_warp import SEGMENTS, TABLE_ROWS, MapWarp
 from glcaustics.caustics.method import CausticsMethod, irradiance_of
 from glcaustics.errors import UsageError
-from glcaustics.gpu import Device
+from glcaustics.gpu import Device, Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes import light_view
-from glcaustics.passes.frame import CORE, FrameSetup, FrameState, LightSetup, PassContext, ReceiverView
+from glcaustics.passes.frame import FrameSetup, FrameState, LightSetup, PassContext, ReceiverView
 from glcaustics.passes.gbuffer import LAYERS
 from glcaustics.passes.light_views import light_uniforms
 from glcaustics.passes.runner import PlanRunner
@@ -49,9 +50,7 @@ class LightMapMethod(CausticsMethod):
     }
     flags: ClassVar[tuple[str, ...]] = ("reflect", "dispersion")
     lights_second_layer = True
-    cores_add: ClassVar[bool] = (
-        False  # True: each sample is drawn in one map, and maps are summed; False: the finest counts
-    )
+    warps: ClassVar[bool] = False  # True: one warped map a view; False: nested cores, each sample drawn in one of them
     option_help: ClassVar[Mapping[str, str]] = {
         "caster_size": "the casters' light view has about this^2 texels, one light sample each (8..8192)",
         "map_size": "the caustic map has about this^2 texels (8..8192)",
@@ -73,6 +72,7 @@ class LightMapMethod(CausticsMethod):
 
     def __init__(self) -> None:
         self._branches: dict[int, list[Branch]] = {}
+        self._warps: dict[tuple[int, str], MapWarp] = {}
         self._left_out: list[tuple[str, str]] = []
 
     @classmethod
@@ -101,11 +101,51 @@ class LightMapMethod(CausticsMethod):
         """The caustic map of one light and receiver view: flux per texel."""
         return light.resource(f"{self.name}.{receiver.name}.flux")
 
+    def warp_of(self, light: LightSetup, receiver: ReceiverView) -> MapWarp | None:
+        """How the map of a view is warped; None: its texels are the view's."""
+        return self._warps.get((light.index, receiver.name))
+
+    def map_desc(self, light: LightSetup, receiver: ReceiverView) -> TextureDesc:
+        """The texture of a caustic map."""
+        warp = self.warp_of(light, receiver)
+        return TextureDesc("rgba32f", receiver.view.size if warp is None else warp.size, "lm")
+
+    def warp_reads(self, light: LightSetup, receiver: ReceiverView) -> tuple[str, ...]:
+        """What a pass reads that uses `set_warp`."""
+        return () if self.warp_of(light, receiver) is None else (self._warp_resource(light, receiver),)
+
+    def warp_define(self, light: LightSetup, receiver: ReceiverView) -> int:
+        """The define WARP of shaders that include `interface/map_warp.glsl`."""
+        return 0 if self.warp_of(light, receiver) is None else SEGMENTS
+
+    def set_warp(self, program: Program, ctx: PassContext, light: LightSetup, receiver: ReceiverView) -> None:
+        """The table of `interface/map_warp.glsl`, where there is one."""
+        if self.warp_of(light, receiver) is not None:
+            program.set(t_warp=ctx.texture(self._warp_resource(light, receiver)))
+
+    def _warp_resource(self, light: LightSetup, receiver: ReceiverView) -> str:
+        return light.resource(f"{self.name}.{receiver.name}.warp")
+
+    def _declare_warp(self, graph: FrameGraph, light: LightSetup, receiver: ReceiverView) -> None:
+        warp = self.warp_of(light, receiver)
+        if warp is None:
+            return
+        resource, table = self._warp_resource(light, receiver), warp.table()
+        graph.add(
+            PassDecl(
+                f"{self.name}.warp.{receiver.name}{light.resource('')}",
+                {resource: TextureDesc("rgba32f", (warp.table_width, TABLE_ROWS), "texel")},
+                lambda ctx: ctx.texture(resource).write(table.tobytes()),
+                note="where the map's texels crowd",
+            )
+        )
+
     def prepare(self, device: Device, setup: FrameSetup, frame: FrameState) -> None:
         """Send a coarse light through the scene once, and fit each light's receiver views to where it lands."""
         for light in setup.lights:
             if light.caster is not None:
-                shares = fit_receivers(self, device, setup, light, frame)
+                shares, warps = fit_receivers(self, device, setup, light, frame)
+                self._warps |= {(light.index, name): warp for name, warp in warps.items()}
                 self._keep_branches(setup, light, shares)
 
     def _keep_branches(self, setup: FrameSetup, light: LightSetup, shares: Mapping[str, float]) -> None:
@@ -141,6 +181,7 @@ class LightMapMethod(CausticsMethod):
             for receiver in self._views(setup, light):
                 zone = receiver.name.removeprefix(receiver.base)
                 branches = [replace(b, zone=zone) for b in self.branches(setup, light) if b.view == receiver.base]
+                self._declare_warp(graph, light, receiver)
                 self.declare_map(graph, setup, light, receiver, branches)
                 maps.append((light, receiver))
         for name, because in self._left_out:
@@ -161,6 +202,7 @@ class LightMapMethod(CausticsMethod):
                     f"gbuffer{layer}.normal_ws",
                     *(self.map_resource(light, receiver) for light, receiver in maps),
                     *(light.resource(f"receiver.{receiver.name}.position_ws") for light, receiver in maps),
+                    *(r for light, receiver in maps for r in self.warp_reads(light, receiver)),
                 ),
                 note="look-up in the caustic maps at the camera's pixels",
             )
@@ -271,7 +313,10 @@ class LightMapMethod(CausticsMethod):
         assert light.caster is not None
         width, height = light.caster.size
         copies = 3 if receiver.view.faces == 6 else 1  # a splat can reach three faces of a cube
-        program = ctx.device.program(f"{SHADERS}/splat", {"RECEIVER_FACES": receiver.view.faces})
+        warp = self.warp_define(light, receiver)
+        program = ctx.device.program(f"{SHADERS}/splat", {"RECEIVER_FACES": receiver.view.faces, "WARP": warp})
+        self.set_warp(program, ctx, light, receiver)
+        size = self.map_desc(light, receiver).size
         program.set_all(
             {
                 "t_splat": ctx.texture(branch.splat),
@@ -279,7 +324,7 @@ class LightMapMethod(CausticsMethod):
                 "t_flux": ctx.texture(branch.flux),
                 "u_width": width,
                 "u_count": width * height,
-                "u_map_size": (float(receiver.view.size[0]), float(receiver.view.size[1])),
+                "u_map_size": (float(size[0]), float(size[1])),
             }
         )
         ctx.device.draw_points(program, target, copies * width * height, blend="add")
@@ -288,20 +333,9 @@ class LightMapMethod(CausticsMethod):
         target = ctx.target(irradiance_of(layer))
         target.clear(0.0, 0.0, 0.0, 0.0)
         for light, receiver in maps:
-            core = None if self.cores_add else light.receivers.get(receiver.name + CORE)
-            is_core = receiver.inner_ndc is not None and not self.cores_add
-            program = ctx.device.program(
-                f"{SHADERS}/gather",
-                {
-                    "RECEIVER_FACES": receiver.view.faces,
-                    "HAS_CORE": int(core is not None),
-                    "IS_CORE": int(is_core),
-                },
-            )
-            if core is not None:
-                program.set(u_core_clip_from_world=core.view.matrices[0], u_core_inner_ndc=core.inner_ndc)
-            if is_core:
-                program.set(u_inner_ndc=receiver.inner_ndc)
+            warp = self.warp_define(light, receiver)
+            program = ctx.device.program(f"{SHADERS}/gather", {"RECEIVER_FACES": receiver.view.faces, "WARP": warp})
+            self.set_warp(program, ctx, light, receiver)
             program.set_all(
                 {
                     **ctx.frame.uniforms(),

@@ -18,23 +18,29 @@ float signed_area(vec3 a, vec3 b, vec3 c) { return 0.5 * cross2(b.xy - a.xy, c.x
 
 // Cap of the density (vertices per texel^2), and the factor by which min(1/|det|, cap) is scaled so that the triangle holds its
 // flux exactly (quadrature of degree 3 over a triangle: Zienkiewicz 1971, table 8.2).
+// `side`: of the triangle as it is drawn. A sliver can lie the wrong way round though its sheet does not fold, since its edges are
+// chords: its neighbours then overlap, and drawn as less than nothing it takes off what they have too much.
 // `drawn` gathers the share of the flux that is drawn then.
-vec2 densities(vec3 a, vec3 b, vec3 c, inout float drawn) {
-    float ratio = 0.5 / max(abs(signed_area(a, b, c)), 1e-6);
-    float cap = DENSITY_CAP * ratio;
-    float mean = 0.0;
+vec2 densities(vec3 a, vec3 b, vec3 c, float side, inout float drawn) {
     vec3 det = vec3(a.z, b.z, c.z);
+    float low = min(det.x, min(det.y, det.z)), high = max(det.x, max(det.y, det.z));
+    // Where the determinant hardly changes, 1/|det| is more exact than the triangle's area.
+    float smallest = low * high > 0.0 ? min(abs(low), abs(high)) : 0.0;
+    float uneven = smoothstep(2.0, 6.0, max(abs(low), abs(high)) / max(smallest, 1e-12));
+    float ratio = 0.5 / max(abs(signed_area(a, b, c)), 1e-6);
+    float cap = DENSITY_CAP * ratio / max(uneven, 1e-3);
+    float mean = 0.0;
     for (int i = 0; i < 3; ++i) {
         mean += 0.05 * min(1.0 / max(abs(det[i]), 1e-12), cap);
         mean += (2.0 / 15.0) * min(1.0 / max(abs(0.5 * (det[i] + det[(i + 1) % 3])), 1e-12), cap);
     }
     mean += 0.45 * min(3.0 / max(abs(det.x + det.y + det.z), 1e-12), cap);
-    float low = min(det.x, min(det.y, det.z)), high = max(det.x, max(det.y, det.z));
-    // Where the determinant hardly changes, 1/|det| is more exact than the triangle's area.
-    float smallest = low * high > 0.0 ? min(abs(low), abs(high)) : 0.0;
-    float uneven = smoothstep(2.0, 6.0, max(abs(low), abs(high)) / max(smallest, 1e-12));
     float factor = mix(1.0, ratio / mean, uneven);
-    drawn += 0.5 * factor * mean / ratio;
+    bool turned = smallest > 0.0 && side * low < 0.0;
+    float share = factor * mean / ratio;  // of a sliver, whose area says little, none is known
+    float sliver = (1.0 - uneven) * smoothstep(1.1, 1.4, max(share, 1.0 / max(share, 1e-12)));
+    drawn += 0.5 * mix(share, 1.0, sliver);
+    if (turned) factor *= uneven - 1.0;
     return vec2(cap, factor);
 }
 
@@ -72,6 +78,8 @@ float resolved_share(ivec2 texel, vec3 a, vec3 b, vec3 c, vec3 d) {
     return folds_ahead(texel, slope, 0.25 * (a.z + b.z + c.z + d.z)) ? share : 1.0;
 }
 
+float side(vec3 a, vec3 b, vec3 c) { return sign(signed_area(a, b, c)); }
+
 // Position and determinant of a vertex on the face of the cell's first one.
 vec3 corner(ivec2 texel, vec4 vertex, int face) {
     vec3 on_face = grid_on_face(texel, texelFetch(t_projected, texel, 0), face);
@@ -96,5 +104,13 @@ void main() {
 #endif
     o_weight.x = resolved_share(texel, a, b, c, d);
     if (o_weight.x == 0.0) return;
-    o_cell = vec4(densities(a, b, c, o_weight.y), densities(b, d, c, o_weight.y));
+    vec2 sides = vec2(side(a, b, c), side(b, d, c));
+#if RECEIVER_FACES == 1
+    // Flux is counted in texels of the view, which are all alike; what can be resolved, in those of the map.
+    a.xy = texelFetch(t_projected, texel, 0).xy;
+    b.xy = texelFetch(t_projected, right, 0).xy;
+    c.xy = texelFetch(t_projected, up, 0).xy;
+    d.xy = texelFetch(t_projected, both, 0).xy;
+#endif
+    o_cell = vec4(densities(a, b, c, sides.x, o_weight.y), densities(b, d, c, sides.y, o_weight.y));
 }

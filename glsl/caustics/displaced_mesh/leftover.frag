@@ -3,6 +3,9 @@
 // resolve is anti-aliased. In the mesh the vertex fades to nothing there, so that both add up to one sheet without a seam.
 #include "caustics/displaced_mesh/grid.glsl"
 #include "common/optics.glsl"
+#if WARP
+#include "interface/map_warp.glsl"
+#endif
 
 uniform sampler2D t_vertex;
 uniform sampler2D t_axes;
@@ -10,6 +13,9 @@ uniform sampler2D t_weight;
 uniform sampler2D t_flux;
 uniform float u_sigma;       // standard deviation of a whole texel's splat in units of the distance to its neighbour
 uniform float u_max_radius;  // texels
+#if RECEIVER_FACES == 1
+uniform vec2 u_map_size;     // texels
+#endif
 
 layout(location = 0) out vec4 o_splat;  // xy: centre in texels of the map; z: radius, texels (0: nothing left over); w: face
 layout(location = 1) out vec4 o_conic;  // xyz: inverse covariance (a, b, c); w: share of the flux / integral of the kernel
@@ -47,8 +53,11 @@ void main() {
     vec4 projected = texelFetch(t_projected, texel, 0);
     vec4 axes = texelFetch(t_axes, texel, 0);
     vec2 a = axes.xy, b = axes.zw, centre = vertex.xy;
-    vec2 alone = vec2(a == vec2(0.0), b == vec2(0.0)) * projected.w;
-    vec3 c = vec3(a.x * a.x + b.x * b.x, a.x * a.y + b.x * b.y, a.y * a.y + b.y * b.y) + vec3(1.0, 0.0, 1.0) * dot(alone, alone);
+    vec2 alone = vec2(a == vec2(0.0), b == vec2(0.0)) * projected.w, rate = vec2(1.0);
+#if WARP
+    warp(projected.xy, u_receiver_size, rate);
+#endif
+    vec3 c = vec3(a.x * a.x + b.x * b.x, a.x * a.y + b.x * b.y, a.y * a.y + b.y * b.y) + vec3(rate.x * rate.x, 0.0, rate.y * rate.y) * dot(alone, alone);
     c = c * (u_sigma * u_sigma) + vec3(PIXEL_VARIANCE, 0.0, PIXEL_VARIANCE);
     float half_trace = 0.5 * (c.x + c.z);
     float largest = half_trace + sqrt(max(half_trace * half_trace - (c.x * c.z - c.y * c.y), 0.0));
@@ -58,7 +67,7 @@ void main() {
     float det = max(c.x * c.z - c.y * c.y, 1e-8);
     float integral = 2.0 * GLC_PI * sqrt(det) * (1.0 - exp(-0.5 * CUTOFF) * (1.0 + 0.5 * CUTOFF));
 #if RECEIVER_FACES == 1
-    centre += 0.5 * u_receiver_size;
+    centre += 0.5 * u_map_size;
 #endif
     o_splat = vec4(centre, radius * shrink, float(grid_face(projected)));
     o_conic = vec4(c.z / det, -c.y / det, c.x / det, (1.0 - share) / integral);

@@ -9,7 +9,7 @@ const float LIMIT = 2.0;  // times the smaller one of a pair
 
 vec3 exchange(vec3 here, ivec2 there, ivec2 lower, ivec2 upper) {
     if (any(lessThan(there, lower)) || any(greaterThanEqual(there, upper))) return vec3(0.0);
-    vec3 other = texelFetch(t_raw, there, 0).rgb;
+    vec3 other = max(texelFetch(t_raw, there, 0).rgb, 0.0);
     vec3 most = LIMIT * min(here, other);
     return clamp(here - other, -most, most);
 }
@@ -23,7 +23,7 @@ void main() {
 #else
     ivec2 lower = ivec2(0), upper = size;
 #endif
-    vec3 here = texelFetch(t_raw, texel, 0).rgb;
+    vec3 here = max(texelFetch(t_raw, texel, 0).rgb, 0.0);
     vec3 sum = exchange(here, texel + ivec2(1, 0), lower, upper) + exchange(here, texel - ivec2(1, 0), lower, upper)
              + exchange(here, texel + ivec2(0, 1), lower, upper) + exchange(here, texel - ivec2(0, 1), lower, upper);
     o_flux = vec4(here + sum / 12.0, 0.0);

@@ -2,10 +2,13 @@
 // fourth-order central differences of the landing points; of lower order beside an edge. No further ray is traced: the landing
 // points around carry the derivatives of any chain of interfaces to O(h^4).
 #include "caustics/displaced_mesh/grid.glsl"
+#if WARP
+#include "interface/map_warp.glsl"
+#endif
 
 uniform float u_unit;  // texels of the map that a texel of the casters' view covers where light goes straight on
 
-layout(location = 0) out vec4 o_vertex;  // xy: position, texels of the map; z: signed determinant; w: links, see grid.glsl
+layout(location = 0) out vec4 o_vertex;  // xy: position, texels of the map; z: signed determinant, texels^2 of the view; w: links, see grid.glsl
 layout(location = 1) out vec4 o_axes;    // xy: derivative along the grid's rows, zw: along its columns; 0 where there is none
 
 const float STRETCH = 3.0;  // a step this much longer than both its neighbours crosses an edge
@@ -59,6 +62,14 @@ vec2 derivative(Line line, out bool right) {
     return vec2(0.0);
 }
 
+#if WARP
+// A whole step, not the derivative at its middle: texels may crowd within it.
+vec2 warped_step(vec2 at, vec2 step) {
+    vec2 rate;
+    return warp(at + 0.5 * step, u_receiver_size, rate) - warp(at - 0.5 * step, u_receiver_size, rate);
+}
+#endif
+
 void main() {
     o_vertex = vec4(0.0);
     o_axes = vec4(0.0);
@@ -68,7 +79,14 @@ void main() {
     bool right, up;
     vec2 a = derivative(read_line(texel, ivec2(1, 0), here), right);
     vec2 b = derivative(read_line(texel, ivec2(0, 1), here), up);
+#if WARP
+    vec2 rate;
+    vec2 place = warp(here.xy, u_receiver_size, rate);
+    o_axes = vec4(warped_step(here.xy, a), warped_step(here.xy, b));
+#else
+    vec2 place = here.xy;
     o_axes = vec4(a, b);
+#endif
     int links = LINK_HERE + (right ? LINK_RIGHT : 0) + (up ? LINK_UP : 0);
-    o_vertex = vec4(here.xy, a.x * b.y - a.y * b.x, float(links));
+    o_vertex = vec4(place, a.x * b.y - a.y * b.x, float(links));
 }

@@ -2,12 +2,19 @@
 // (Shah et al. 2007, sec. III B). E = flux of the texel x cos / cross-section: the receiver's own area, not the light's.
 #include "interface/receiver_view.glsl"
 #include "interface/camera.glsl"
+#if WARP
+#include "interface/map_warp.glsl"
+#endif
 
 uniform sampler2D t_depth_m;
 uniform sampler2D t_normal_ws;
 uniform sampler2D t_receiver_position;
 uniform sampler2D t_flux;
 uniform int u_max_taps;     // per axis
+
+#if WARP
+const float WARP_TAPS = 32.0;
+#endif
 
 in vec2 v_uv;
 layout(location = 0) out vec4 o_irradiance;  // W/m^2 or lux
@@ -22,6 +29,13 @@ float same_surface(GlcView view, vec3 p_ws, vec3 n_ws, vec3 l, float width, ivec
     return abs(dot(off, n_ws)) < 2.0 * width && length(off) < 4.0 * width / cos_l ? 1.0 : 0.0;
 }
 
+// Where a place of the view lies in the map, texels of it; `rate`: those in a texel of the view.
+#if WARP
+vec2 map_place(GlcView view, vec2 projected, out vec2 rate) {
+    return warp(projected - 0.5 * view.size, view.size, rate) + 0.5 * vec2(textureSize(t_flux, 0));
+}
+#endif
+
 // Irradiance at p, bilinear over the texels that hold its surface; w = 1 where there is one.
 vec4 irradiance_at(GlcView view, vec3 p, vec3 n) {
     vec3 l = glc_light_direction(view, p);
@@ -30,10 +44,16 @@ vec4 irradiance_at(GlcView view, vec3 p, vec3 n) {
     vec3 projected = glc_view_project(view, p);
     if (cos_l <= 0.0 || !glc_view_inside(view, projected)) return vec4(0.0);
     float width = glc_texel_width(view, p);
+    vec2 rate = vec2(1.0);
+#if WARP
+    vec2 at = map_place(view, projected.xy, rate) - 0.5;
+#else
     vec2 at = projected.xy - 0.5;
+#endif
+    width /= min(1.0, min(rate.x, rate.y));
     ivec2 base = ivec2(floor(at));
     vec2 f = at - vec2(base);
-    ivec2 lower = ivec2(0), upper = ivec2(view.size) - 1;
+    ivec2 lower = ivec2(0), upper = textureSize(t_flux, 0) - 1;
 #if RECEIVER_FACES == 6
     ivec2 tile = ivec2(view.size / vec2(3.0, 2.0));
     lower = ivec2(projected.xy) / tile * tile;
@@ -44,7 +64,13 @@ vec4 irradiance_at(GlcView view, vec3 p, vec3 n) {
     float total = 0.0;
     for (int i = 0; i < 4; ++i) {
         ivec2 texel = clamp(base + ivec2(i & 1, i >> 1), lower, upper);
-        float w = weights[i] * same_surface(view, p, n, l, width, texel);
+#if WARP
+        vec2 there = projected.xy + (vec2(texel) - at) / rate;
+        ivec2 seen = clamp(ivec2(floor(there)), ivec2(0), ivec2(view.size) - 1);
+#else
+        ivec2 seen = texel;
+#endif
+        float w = weights[i] * same_surface(view, p, n, l, width, seen);
         if (w <= 0.0) continue;
         flux += w * texelFetch(t_flux, texel, 0).rgb;
         total += w;
@@ -61,20 +87,6 @@ vec3 on_plane(vec2 uv, vec3 p, vec3 n, float depth_m) {
     return abs(d_n) > 0.05 ? q + ray * (dot(p - q, n) / d_n) : q;
 }
 
-// Where most of the light lands in a small part of the window, that part (the core) has a map of its own, at its own scale.
-#if HAS_CORE
-uniform mat4 u_core_clip_from_world;
-uniform vec2 u_core_inner_ndc;
-#endif
-#if IS_CORE
-uniform vec2 u_inner_ndc;
-#endif
-
-bool in_window(mat4 clip_from_world, vec2 inner_ndc, vec3 p_ws) {
-    vec4 clip = clip_from_world * vec4(p_ws, 1.0);
-    return clip.w > 0.0 && all(lessThan(abs(clip.xy), inner_ndc * clip.w));
-}
-
 void main() {
     o_irradiance = vec4(0.0);
     float depth_m = texelFetch(t_depth_m, ivec2(gl_FragCoord.xy), 0).r;
@@ -82,12 +94,6 @@ void main() {
     vec3 p = glc_camera_position_ws(v_uv, depth_m);
     vec3 n = texelFetch(t_normal_ws, ivec2(gl_FragCoord.xy), 0).xyz;
     GlcView view = glc_receiver_view();
-#if HAS_CORE
-    if (in_window(u_core_clip_from_world, u_core_inner_ndc, p)) return;
-#endif
-#if IS_CORE
-    if (!in_window(u_receiver_clip_from_world, u_inner_ndc, p)) return;
-#endif
     vec3 centre = glc_view_project(view, p);
     if (!glc_view_inside(view, centre)) return;
     // A pixel that covers several texels takes their mean, or fold lines one texel wide would flicker and lose energy.
@@ -95,7 +101,16 @@ void main() {
     int face = glc_view_face(view, p);
     vec2 across = glc_view_project_on(view, on_plane(v_uv + vec2(pixel.x, 0.0), p, n, depth_m), face).xy - centre.xy;
     vec2 along = glc_view_project_on(view, on_plane(v_uv + vec2(0.0, pixel.y), p, n, depth_m), face).xy - centre.xy;
-    ivec2 taps = clamp(ivec2(ceil(vec2(length(across), length(along)) - 0.25)), ivec2(1), ivec2(u_max_taps));
+    int most = u_max_taps;
+#if WARP
+    // Half the pixel to either side: what crowds there is met at least on one.
+    vec2 rate;
+    map_place(view, centre.xy, rate);
+    most = int(min(float(most) * max(rate.x, rate.y), WARP_TAPS));  // where texels crowd, a pixel covers many
+    across = map_place(view, centre.xy + 0.5 * across, rate) - map_place(view, centre.xy - 0.5 * across, rate);
+    along = map_place(view, centre.xy + 0.5 * along, rate) - map_place(view, centre.xy - 0.5 * along, rate);
+#endif
+    ivec2 taps = clamp(ivec2(ceil(vec2(length(across), length(along)) - 0.25)), ivec2(1), ivec2(most));
     vec4 sum = vec4(0.0);
     for (int j = 0; j < taps.y; ++j)
         for (int i = 0; i < taps.x; ++i) {

@@ -4,7 +4,10 @@ flat in vec3 v_conic;
 flat in vec3 v_flux;
 flat in vec4 v_tile;
 
-layout(location = 0) out vec4 o_flux;  // flux per texel of the map, W or lm; additive
+#if WARP
+#include "interface/map_warp.glsl"
+#endif
+layout(location = 0) out vec4 o_flux;  // flux per texel of the map (of the view, where the map is warped), W or lm; additive
 
 const float SPLAT_CUTOFF = 7.0;
 const float SPLAT_FLOOR = 0.0301973834223;  // exp(-7/2)
@@ -31,5 +34,8 @@ void main() {
     }
 #endif
     if (w <= 0.0) discard;
+#if WARP
+    w /= warped_area(ivec2(gl_FragCoord.xy));
+#endif
     o_flux = vec4(v_flux * w, 0.0);
 }
