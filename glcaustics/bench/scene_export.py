@@ -129,14 +129,12 @@ def _analytic(body: WaterBody, time_s: float, facets: int | None) -> BeamWater |
     x, _, z = (float(v) for v in mesh.positions_m.max(axis=0) - mesh.positions_m.min(axis=0))
     field = HeightField(lambda x, z: surface.height(x, z, time_s), lambda x, z: surface.gradient(x, z, time_s))
     bound = sum(abs(w.amplitude_m) for w in surface.waves)
-    key = repr((surface.waves, float(time_s))).encode()
     return BeamWater(
         field,
         _three(body.world_from_object[:3, 3]),
         (x, z),
         bound,
         _optics(OpticalKind.INTERFACE, body.material, facets),
-        key,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import os
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,16 +15,17 @@ import numpy as np
 import numpy.typing as npt
 
 from glcaustics.errors import UsageError
-from glcaustics.optics.reference_cache import cache_folder
 from glcaustics.output import write_bytes, write_text
 from glcaustics.scene.model import Scene
 
 Arrays = dict[str, npt.NDArray[Any]]
+CACHE_ENV = "GLCAUSTICS_CACHE"
 
 
 def default_cache() -> Path:
-    """`bench` in the folder of the reference cache (`$GLCAUSTICS_CACHE`, else `~/.cache/glcaustics`)."""
-    return cache_folder() / "bench"
+    """Where references are kept: `bench` in `$GLCAUSTICS_CACHE`, else in `~/.cache/glcaustics`."""
+    named = os.environ.get(CACHE_ENV)
+    return (Path(named).expanduser() if named else Path.home() / ".cache" / "glcaustics") / "bench"
 
 
 def digest(*parts: Any) -> str:

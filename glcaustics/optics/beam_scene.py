@@ -53,7 +53,6 @@ class BeamWater:
     """An analytic dielectric height field y = centre.y + field(x - centre.x, z - centre.z) over a rectangle.
 
     `size_m`: (x, z). `max_height_m`: bound of |field|. A ray meets it at most once; waves do not shade one another.
-    `key`: bytes that identify the field's formula in the cache.
     """
 
     field: HeightField
@@ -61,7 +60,6 @@ class BeamWater:
     size_m: tuple[float, float]
     max_height_m: float
     optics: SurfaceOptics
-    key: bytes
 
 
 @dataclass(frozen=True)

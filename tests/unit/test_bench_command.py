@@ -14,7 +14,7 @@ import pytest
 
 import glcaustics
 from glcaustics.bench.page import page
-from glcaustics.bench.store import Store, digest, scene_key
+from glcaustics.bench.store import CACHE_ENV, Store, default_cache, digest, scene_key
 from glcaustics.bench.study import FULL, QUICK, SCHEMA, Study
 from glcaustics.bench.targets import TARGETS, bench_scene
 from glcaustics.cli import main
@@ -141,6 +141,13 @@ def test_store_keeps_and_ignores_what_is_broken(tmp_path: Path) -> None:
     for broken in (b"", b"PK broken", whole[: len(whole) // 2]):
         (tmp_path / "a.npz").write_bytes(broken)
         assert store.load("a") is None
+
+
+def test_the_cache_is_where_it_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(CACHE_ENV, str(tmp_path / "cache"))
+    assert default_cache() == tmp_path / "cache" / "bench"
+    monkeypatch.delenv(CACHE_ENV)
+    assert default_cache() == Path.home() / ".cache" / "glcaustics" / "bench"
 
 
 def test_keys_tell_scenes_apart() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +19,6 @@ from glcaustics.optics.light_mesh import light_patches
 from glcaustics.optics.pixels import pixel_edges
 from glcaustics.optics.receivers import PlaneGrid, PlaneReceiver
 from glcaustics.optics.reference import BeamSettings, reference_map, reference_points, trace_beams
-from glcaustics.optics.reference_cache import CACHE_ENV, cached_reference, content_key
 from glcaustics.scene.load import load_scene
 from tests.gpu.physics_scenes import BINS, CASES
 
@@ -34,7 +32,7 @@ def floor_mesh(y_m: float, half_m: float) -> BeamMesh:
 
 
 def pool(strength: float, light: BeamLight) -> BeamScene:
-    water = BeamWater(peer_pool_field(strength), (0, 0, 0), (2, 2), 0.1, WATER, f"peer-pool {strength}".encode())
+    water = BeamWater(peer_pool_field(strength), (0, 0, 0), (2, 2), 0.1, WATER)
     return BeamScene((floor_mesh(-1.0, 2.0),), (light,), (water,))
 
 
@@ -218,7 +216,7 @@ def test_total_internal_reflection_is_followed() -> None:
 
 def test_dispersion_sends_the_channels_apart() -> None:
     optics = SurfaceOptics(SurfaceKind.DIELECTRIC, (1.2, 1.4, 1.6))
-    water = BeamWater(peer_pool_field(0.0), (0, 0, 0), (1, 1), 0.1, optics, b"flat")
+    water = BeamWater(peer_pool_field(0.0), (0, 0, 0), (1, 1), 0.1, optics)
     light = BeamLight((1, 1, 1), (1.0, -1.0, 0.0))
     scene = BeamScene((floor_mesh(-1.0, 2.0),), (light,), (water,))
     grid = PlaneGrid.floor(2.0, -1.0, 64)
@@ -262,7 +260,7 @@ def test_points_agree_with_the_map() -> None:
 
 def test_eye_rays_refract_to_the_floor() -> None:
     scene = beam_scene(load_scene("peer-pool"))
-    flat = BeamScene(scene.meshes, scene.lights, (BeamWater(peer_pool_field(0.0), (0, 0, 0), (2, 2), 0.1, WATER, b""),))
+    flat = BeamScene(scene.meshes, scene.lights, (BeamWater(peer_pool_field(0.0), (0, 0, 0), (2, 2), 0.1, WATER),))
     origin = np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.5, 1.0, 0.0], [0.0, 1.0, 0.0]])
     direction = np.array([[0, -1.0, 0], [0.6, -0.8, 0], [0, -1.0, 0], [0, 1.0, 0]])
     hits = eye_hits(flat, origin, direction)
@@ -287,30 +285,6 @@ def test_scene_export_names_its_planes() -> None:
     assert grid.corner_ws == pytest.approx((-2, -1, -2)) and grid.side_u_ws == pytest.approx((4, 0, 0))
     with pytest.raises(UsageError, match="no instance 'wall'"):
         receiver_plane(scene, "wall", (8, 8))
-
-
-def test_cache_is_keyed_by_content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(CACHE_ENV, str(tmp_path / "cache"))
-    grid, settings = PlaneGrid.floor(1.0, -1.0, 8), BeamSettings(cells=16, max_events=1)
-    key = content_key(pool(1.0, SLANTED), grid, settings)
-    assert key == content_key(pool(1.0, SLANTED), grid, settings)
-    assert key != content_key(pool(0.9, SLANTED), grid, settings)
-    assert key != content_key(pool(1.0, SLANTED), grid, BeamSettings(cells=17, max_events=1))
-    calls = []
-
-    def compute():  # type: ignore[no-untyped-def]
-        calls.append(1)
-        return reference_map(pool(1.0, SLANTED), grid, settings)
-
-    first, second = cached_reference(key, compute), cached_reference(key, compute)
-    assert len(calls) == 1
-    np.testing.assert_array_equal(first.mean, second.mean)
-    assert first.report() == second.report()
-    (tmp_path / "cache" / f"{key}.npz").write_bytes(b"broken")
-    cached_reference(key, compute)
-    assert len(calls) == 2
-    with pytest.raises(UsageError, match="no content"):
-        content_key(compute)
 
 
 def test_a_scene_without_specular_surfaces_is_refused() -> None:
