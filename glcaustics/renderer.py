@@ -19,7 +19,7 @@ from glcaustics.denoise import svgf
 from glcaustics.errors import UsageError
 from glcaustics.gpu import Device, create_device
 from glcaustics.graph import FrameGraph, Plan
-from glcaustics.passes import depth_chain, gbuffer, lighting, refraction, rsm, shadow_map, tonemap
+from glcaustics.passes import depth_chain, gbuffer, lighting, refraction, rsm, shadow_map, taa, tonemap
 from glcaustics.passes.eye_medium import EyeMediumFinder
 from glcaustics.passes.frame import CameraState, FrameSetup, FrameState
 from glcaustics.passes.geometry import GpuScene
@@ -148,7 +148,12 @@ class _Declared:
 
 
 def _declare(
-    setup: FrameSetup, method: CausticsMethod | None, aovs: tuple[str, ...], specular_view: bool, method_name: str
+    setup: FrameSetup,
+    method: CausticsMethod | None,
+    aovs: tuple[str, ...],
+    specular_view: bool,
+    method_name: str,
+    antialias: bool = False,
 ) -> _Declared:
     """The whole frame, before anything is culled."""
     graph = FrameGraph()
@@ -175,6 +180,11 @@ def _declare(
         for name in ("gbuffer2", "gbuffer.specular", "gbuffer.specular_back", "refraction"):
             graph.leave_out(name, why)
     radiance = "view.radiance" if specular else "shade.radiance"
+    if antialias:
+        taa.declare(graph, setup, radiance, specular=specular)
+        radiance = taa.RADIANCE
+    else:
+        graph.leave_out("taa", taa.OFF)
     tonemap.declare(graph, setup, radiance)
     outputs = ("present.ldr", radiance, *_aov_resources(setup, aovs, specular, caustics))
     return _Declared(graph, tuple(dict.fromkeys(outputs)), radiance, specular)
@@ -252,6 +262,8 @@ class Renderer:
         seed: of everything random.
         options: single options on top of the ladder, see `glcaustics methods`.
         stats: read solves back and count them.
+        taa: anti-aliasing over time: the camera is shifted by parts of a pixel from frame to frame, and `image` and
+            `ldr` are means over the last frames, followed along the motion. AOVs are those of the shifted frame.
         keep: draw what the camera does not enter (shadow maps, caustic maps) anew only when the scene has moved;
             off, every frame pays for all of it, as the benchmarks want.
         shader_root: another folder of shaders than the project's own, for tests.
@@ -275,6 +287,7 @@ class Renderer:
         seed: int = 0,
         options: Mapping[str, Any] | None = None,
         stats: bool = True,
+        taa: bool = False,
         keep: bool = True,
         shader_root: Path | None = None,
     ) -> None:
@@ -288,6 +301,7 @@ class Renderer:
             shown = "x".join(str(n) for n in self.size)
             raise UsageError(f"the picture's size is {shown}", where="size", remedy="give at least 1x1 pixels")
         self._keep = keep
+        self._taa = taa
         self._target = target
         self._present: moderngl.Framebuffer | None = None
         if target is not None and target.size != self.size:
@@ -376,10 +390,12 @@ class Renderer:
                 the first, unshifted one; `stats["frame_ms"]` is the median over the samples.
 
         Raises:
-            UsageError: samples below 1.
+            UsageError: samples below 1, or several with `taa`.
         """
         if samples < 1:
             raise UsageError(f"{samples} samples a pixel", where="samples", remedy="give at least 1")
+        if samples > 1 and self._taa:
+            raise UsageError(f"{samples} samples a pixel with taa", where="samples", remedy="use one of the two")
         with self.device.guard_state():
             frame = self._render(time)
             return frame if samples == 1 else self._average(frame, time, samples)
@@ -391,7 +407,7 @@ class Renderer:
         image, ldr = first.image.astype(np.float64), first.ldr.astype(np.float64)
         times_ms = [first.stats["frame_ms"]]
         for index in range(1, samples):
-            jitter = (_halton(index, 2) - 0.5, _halton(index, 3) - 0.5)
+            jitter = (taa.halton(index, 2) - 0.5, taa.halton(index, 3) - 0.5)
             start = clock.perf_counter()
             self._draw(time, jitter)
             self.device.ctx.finish()
@@ -410,11 +426,14 @@ class Renderer:
 
     def _draw(self, time: float, jitter_px: tuple[float, float] = (0.0, 0.0)) -> PlanRunner:
         runner = self._prepared(time)
+        if self._taa:
+            jitter_px = taa.jitter_px(self._frames)
         frame = self._frame_state(time, jitter_px)
         runner.run(frame)
         self._frames += 1
         self._drawn = frame.camera
-        if jitter_px == (0.0, 0.0):  # a shifted sample is no frame of its own: motion is counted from frame to frame
+        # A shifted sample is no frame of its own: motion is counted from frame to frame.
+        if self._taa or jitter_px == (0.0, 0.0):
             self._previous = (frame.camera, {i.instance.name: i.world_from_object for i in self._gpu.items})
         if self._target is not None:
             self._copy_to_target(runner)
@@ -442,7 +461,7 @@ class Renderer:
             enabled, self.device.timing_enabled = self.device.timing_enabled, False
             self._method.prepare(self.device, self._setup, frame)
             self.device.timing_enabled = enabled
-        self._declared = _declare(self._setup, self._method, self.aovs, self.specular_view, self.method_name)
+        self._declared = _declare(self._setup, self._method, self.aovs, self.specular_view, self.method_name, self._taa)
         outputs = self._declared.outputs
         if self._setup.collect_stats and self._method is not None:
             outputs = tuple(dict.fromkeys((*outputs, *self._method.stats_resources())))
@@ -539,8 +558,8 @@ class Renderer:
         assert self._previous is not None
         camera = self._previous[0]
         height, width = depth_m.shape
-        x = ((np.arange(width) + 0.5) / width * 2 - 1) * camera.lens[0]
-        y = (1 - (np.arange(height) + 0.5) / height * 2) * camera.lens[1]
+        x = (((np.arange(width) + 0.5) / width - camera.jitter_uv[0]) * 2 - 1) * camera.lens[0]
+        y = (1 - ((np.arange(height) + 0.5) / height + camera.jitter_uv[1]) * 2) * camera.lens[1]
         scale = np.ones_like(depth_m, np.float64) if camera.orthographic else depth_m.astype(np.float64)
         view = np.stack([x[None, :] * scale, y[:, None] * scale, -depth_m.astype(np.float64)], axis=2)
         m = camera.world_from_camera
@@ -582,13 +601,3 @@ class Renderer:
             "solves": solves,
             "lost_flux": sum(s["flux_lost"] for s in solves) / flux if flux > 0 else None,
         }
-
-
-def _halton(index: int, base: int) -> float:
-    """Element of the Halton sequence (Halton 1960), in [0, 1)."""
-    value, fraction = 0.0, 1.0
-    while index > 0:
-        fraction /= base
-        value += fraction * (index % base)
-        index //= base
-    return value

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from glcaustics.renderer import Frame, Renderer
     from glcaustics.scene.model import Scene
 
+DEFAULT_SAMPLES = 4  # a pixel
 PROGRESS_INTERVAL_S = 5.0  # between progress lines when stderr is not a terminal
 
 
@@ -33,6 +34,11 @@ class Job:
     json_path: Path | None  # None: no file (standard output, or no JSON asked)
     aovs: tuple[str, ...]
     options: dict[str, Any]
+
+    @property
+    def samples(self) -> int:
+        """Pictures averaged a frame; one when the mean goes over the frames."""
+        return self.args.samples or (1 if self.args.taa else DEFAULT_SAMPLES)
 
 
 def render_command(args: argparse.Namespace) -> int:
@@ -57,6 +63,7 @@ def render_command(args: argparse.Namespace) -> int:
         specular_view=args.specular_view,
         seed=args.seed,
         options=job.options,
+        taa=args.taa,
     )
     with renderer:
         _announce(renderer.announcements, said=scene.announcements)
@@ -69,6 +76,8 @@ def _check(args: argparse.Namespace, known_aovs: dict[str, str]) -> Job:
     if args.scene is None:
         raise UsageError("which scene?", where="glcaustics render", remedy="name one: glcaustics scenes lists them")
     check_method(args.method)
+    if args.taa and (args.samples or 1) > 1:
+        raise UsageError("averages over frames", where="--taa", remedy="leave --samples out, or give 1")
     aovs = check_aovs(args.aov, known_aovs)
     target = output.check_output(args.output or f"{Path(args.scene).stem}.png")
     if target.suffix.lower() == ".png" and set(aovs) - {"image"}:
@@ -101,7 +110,7 @@ def _render_frames(renderer: Renderer, job: Job) -> list[dict[str, Any]]:
     progress = Progress(len(job.paths))
     for index, path in enumerate(job.paths):
         time_s = args.time + index / args.fps
-        frame = renderer.render(time=time_s, samples=job.args.samples)
+        frame = renderer.render(time=time_s, samples=job.samples)
         _store(frame, path, job.aovs)
         records.append({"index": index, "time_s": time_s, "file": str(path), "stats": frame.stats})
         progress.step(index + 1, path)

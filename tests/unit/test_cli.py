@@ -27,6 +27,7 @@ class FakeRenderer:
 
     def __init__(self, scene: Any, **options: Any) -> None:
         self.scene, self.options, self.times = scene, options, []
+        self.samples: list[int] = []
         self.announcements = (*scene.announcements, "auto took egl")
         FakeRenderer.made.append(self)
 
@@ -40,6 +41,7 @@ class FakeRenderer:
         if len(self.times) == FakeRenderer.fail_at:
             raise DeviceError("the context was lost", where="lighting", remedy="try again")
         self.times.append(time)
+        self.samples.append(samples)
         width, height = self.options["size"]
         image = np.full((height, width, 3), time, dtype=np.float32)
         aov = {name: image for name in self.options["aovs"] if name in FakeRenderer.delivers}
@@ -107,7 +109,16 @@ def test_render_hands_every_option_on() -> None:
         "specular_view": False,
         "seed": 7,
         "options": {"map_size": 64, "estimate": "newton"},
+        "taa": False,
     }
+
+
+def test_taa_takes_one_sample_a_frame() -> None:
+    assert cli.main(["render", "pool", "--size", "4x2", "--taa"]) == 0
+    assert cli.main(["render", "pool", "--size", "4x2"]) == 0
+    assert [made.options["taa"] for made in FakeRenderer.made] == [True, False]
+    assert [made.samples for made in FakeRenderer.made] == [[1], [4]]
+    assert cli.main(["render", "pool", "--taa", "--samples", "4"]) == 2
 
 
 def test_quality_falls_back_to_the_scene_s_own() -> None:
