@@ -48,6 +48,11 @@ class EyeMediumFinder:
         self._key: tuple[int, bytes] | None = None
         self._found: EyeMedium | None = None
 
+    @property
+    def found(self) -> EyeMedium | None:
+        """The last answer."""
+        return self._found
+
     def find(
         self, instances: Sequence[Instance], boxes_ws: FloatArray, eye_ws: FloatArray, version: int = 0
     ) -> EyeMedium | None:

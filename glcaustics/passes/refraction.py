@@ -22,7 +22,9 @@ SOLVERS: dict[str, str] = {
     "hierarchical": "marching over a chain of depth bounds (Uludag 2014)",
     "sousa": "the straight pixel, moved (Sousa 2005)",
 }
+SECOND_CHAIN = ("depth_chain2.bounds",)
 PLANES, CHAIN = ("gbuffer.plane",), ("depth_chain.bounds",)
+SECOND_LAYER = ("shade2.radiance", "gbuffer2.plane", "shade2.caustic_irradiance")
 _MARCH = {"cascade": 2, "newton": 0, "dda": 1, "hierarchical": 2, "sousa": 0}
 OUTPUTS = {
     "RADIANCE": "view.radiance",
@@ -44,6 +46,10 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
     solver = str(setup.options["refraction"])
     cascade = solver == "cascade"
     solids = OpticalKind.SOLID in setup.kinds()
+    second: tuple[str, ...] = (
+        SECOND_LAYER if int(setup.options.get("depth_layers", 1)) > 1 and solver != "sousa" else ()
+    )
+    second += SECOND_CHAIN if second and _MARCH[solver] else ()
     graph.add(
         PassDecl(
             "refraction",
@@ -61,7 +67,7 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
                 *(CHAIN if _MARCH[solver] == 2 else ()),
                 *(("specular.plane", "specular.back_plane", "specular.back_normal_ws") if solids else ()),
             ),
-            optional=("caustics.irradiance",),
+            optional=("caustics.irradiance", *second),
             always_writes=("view.radiance", TODO) if cascade else (),
             note=f"what water, glass and mirrors show; eye rays: {SOLVERS[solver]}{_eye_at_start(setup)}",
         )
@@ -117,6 +123,7 @@ def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
         **outputs,
         **_eye_defines(ctx),
         "FINAL": stage["FINAL"],
+        "HAS_SECOND": int(stage["FINAL"] and ctx.has("shade2.radiance")),
         "RETRY": stage.get("RETRY", 0),
         "REFLECTION": stage.get("REFLECTION", 0),
         "USE_NEWTON": stage["NEWTON"],
@@ -176,10 +183,13 @@ def _textures(ctx: PassContext) -> dict[str, Any]:
         "t_plane": "gbuffer.plane",
         "t_bounds": "depth_chain.bounds",
         "t_front_plane": "specular.plane",
-        "t_front_normal": "specular.normal_ws",
         "t_back_plane": "specular.back_plane",
         "t_back_normal": "specular.back_normal_ws",
         "t_caustics": "caustics.irradiance",
+        "t_radiance2": "shade2.radiance",
+        "t_plane2": "gbuffer2.plane",
+        "t_bounds2": "depth_chain2.bounds",
+        "t_caustics2": "shade2.caustic_irradiance",
     }
     found = {name: ctx.texture(resource) for name, resource in samplers.items() if ctx.has(resource)}
     return {**found, "t_objects": ctx.frame.gpu.objects}

@@ -61,6 +61,7 @@ def test_a_floor_seen_directly_is_absorbed_and_its_caustics_are_not() -> None:
     distance = -1.5 / down[..., 1:2]
     expected = floor_radiance() * np.exp(-SEA.sigma_a * distance)
     assert (frame.aov["solve_status"] == 0).all()
+    assert frame.stats["eye_medium"].startswith("the eye is in 'sea' (index 1.333, absorption 0.805, ")
     ratio = frame.image / expected
     np.testing.assert_allclose(ratio.mean(axis=(0, 1)), 1.0, rtol=0.002)
     assert np.abs(ratio - 1.0).max() < 0.02  # the caustic map's own grain

@@ -26,6 +26,7 @@ layout(location = LOCATION_SOLVE) out vec4 o_solve;              // uv of the hi
 #define GLC_VIEW_MARCHED 5.0
 #define GLC_VIEW_OFFSCREEN 6.0
 #define GLC_VIEW_HIDDEN 7.0
+#define GLC_VIEW_SECOND 8.0
 
 struct Seen {
     vec3 radiance;

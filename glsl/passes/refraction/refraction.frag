@@ -6,6 +6,9 @@
 #include "interface/camera.glsl"
 #include "interface/objects.glsl"
 #include "passes/refraction/trace.glsl"
+
+uniform sampler2D t_specular_depth_m;
+uniform sampler2D t_specular_normal;
 #if HAS_SOLID
 #include "passes/refraction/solid.glsl"
 #endif
@@ -14,8 +17,6 @@
 #include "passes/refraction/eye_medium.glsl"
 #endif
 
-uniform sampler2D t_specular_depth_m;
-uniform sampler2D t_specular_normal;
 
 #if ONE_OBJECT
 // A scene with one specular object, of this kind: its material without a fetch.

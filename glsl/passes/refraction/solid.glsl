@@ -1,7 +1,6 @@
 // The way through a solid: exits on its back faces and, after total internal reflection, on its front faces too (Wyman 2005,
 // with both solved by Newton's method).
 uniform sampler2D t_front_plane;
-uniform sampler2D t_front_normal;
 uniform sampler2D t_back_plane;
 uniform sampler2D t_back_normal;
 
@@ -17,7 +16,7 @@ bool solid_exit(vec3 p, vec3 d, out vec3 exit_ws, out vec3 n, out float t) {
     // An unsolved exit (outlines, mostly) ends at the last point inside.
     float u = solve.status == GLC_SOLVE_HIT ? solve.u : min(solve.u, solve.u_front);
     vec2 uv = clamp((ray.start.xy + u * ray.step.xy) / u_raster_size, vec2(0.0), vec2(1.0));
-    vec3 stored = away ? textureLod(t_back_normal, uv, 0.0).xyz : texelFetch(t_front_normal, ivec2(uv * u_raster_size * 0.99999), 0).xyz;
+    vec3 stored = away ? textureLod(t_back_normal, uv, 0.0).xyz : texelFetch(t_specular_normal, ivec2(uv * u_raster_size * 0.99999), 0).xyz;
     n = glc_safe_normalize(stored, -d);
     if (dot(n, d) > 0.0) n = -n;
     t = glc_raster_distance(ray, u);

@@ -27,6 +27,10 @@ uniform int u_reflection_steps;
 // Points of a ray at which the cascade looks for what may stand before it.
 const int CLEAR_POINTS = 6;
 
+#if HAS_SECOND
+#include "passes/refraction/second.glsl"
+#endif
+
 Seen seen_at(vec2 uv, float distance_m, GlcSolve solve, float status) {
     Seen seen = Seen(textureLod(t_radiance, uv, 0.0).rgb, vec3(0.0), distance_m, uv, solve.error_px, float(solve.iterations), status);
 #if HAS_CAUSTICS_VIEW
@@ -38,6 +42,10 @@ Seen seen_at(vec2 uv, float distance_m, GlcSolve solve, float status) {
 // At a solved ray's end. The radiance's alpha holds depth: where filtering would mix in another surface, the texel alone counts
 // (fetched by the final stage: before it, such a pixel is left to do).
 Seen seen_hit(GlcRasterRay ray, GlcSolve solve, float status, out bool mixes) {
+#if HAS_SECOND
+    mixes = false;
+    if (status == GLC_VIEW_SECOND) return seen_second(ray, solve);
+#endif
     vec3 end = ray.start + solve.u * ray.step;
     float depth_m = ORTHOGRAPHIC == 1 ? -end.z : 1.0 / end.z;
     vec2 uv = end.xy / u_raster_size;
@@ -137,6 +145,9 @@ Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved) {
         status = GLC_VIEW_MARCHED;
     }
 #endif
+#if HAS_SECOND
+    look_behind(ray, u_refraction_steps, solve, status);
+#endif
     solved = solve.status == GLC_SOLVE_HIT;
     vec2 uv = (ray.start.xy + solve.u * ray.step.xy) / u_raster_size;
     Seen seen;
@@ -163,9 +174,13 @@ Seen look_along(vec3 p, vec3 d) {
 #if USE_MARCH
     GlcRasterRay ray = eye_ray(p, d);
     GlcSolve solve = MARCH(ray, u_reflection_steps);
+    float status = GLC_VIEW_MARCHED;
     bool mixes;
+#if HAS_SECOND
+    look_behind(ray, u_reflection_steps, solve, status);
+#endif
     if (solve.status == GLC_SOLVE_HIT)
-        return seen_hit(ray, solve, GLC_VIEW_MARCHED, mixes);
+        return seen_hit(ray, solve, status, mixes);
     return seen_beyond(ray, d, solve);
 #else
     return Seen(glc_sky_radiance(d), vec3(0.0), 0.0, vec2(-1.0), 0.0, 0.0, GLC_VIEW_SKY);
