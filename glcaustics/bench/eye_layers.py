@@ -1,0 +1,155 @@
+"""What a second depth layer buys and costs: refracted eye rays against float64 ray casting, with one layer and two."""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from glcaustics.bench.convergence import seeded_cameras
+from glcaustics.bench.scene_export import beam_mesh
+from glcaustics.bench.solver_variants import Buffers, scene_buffers
+from glcaustics.gpu import create_device
+from glcaustics.optics.beam_scene import BeamScene
+from glcaustics.optics.raycast import RayCaster
+from glcaustics.passes.raster import raster_from_world
+from glcaustics.renderer import Renderer
+from glcaustics.scene.load import load_scene
+from glcaustics.scene.model import Camera, OpticalKind, Scene
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+SOLVED, HIDDEN, SECOND = (1, 5, 8), 7, 8  # of `solve_status`
+
+
+@dataclass(frozen=True)
+class LayerShares:
+    """Of one view's refracted rays that hit an opaque surface within the picture (float64), the shares, by layers.
+
+    `right`: solved within one pixel (max norm) of the truth; `wrong`: said to be solved elsewhere; `hidden`: said to
+    end behind something; `second`: solved in the second layer, and `second_right` of these within one pixel.
+    `cost`: processor time of a whole frame over that with one layer.
+    """
+
+    rays: int
+    right: float
+    wrong: float
+    hidden: float
+    second: float
+    second_right: float
+    cost: float
+
+
+def true_pixels(caster: RayCaster, buffers: Buffers) -> tuple[FloatArray, BoolArray]:
+    """Where the picture holds each ray's first hit, (H, W, 2) pixels, and the mask of rays with one; row 0 lowest."""
+    tried = buffers.ray[..., 3] > 0.0
+    direction = np.asarray(buffers.ray[tried][:, :3], np.float64)
+    hits = caster.first_hits(np.asarray(buffers.origin_ws[tried], np.float64), direction)
+    points = np.where((hits.object_id >= 0)[:, None], hits.point_ws, 0.0)
+    q = np.concatenate([points, np.ones((len(points), 1))], axis=1) @ raster_from_world(buffers.camera, buffers.size).T
+    px = q[:, :2] / np.where(q[:, 3:] > 0.0, q[:, 3:], 1.0)
+    inside = (hits.object_id >= 0) & (q[:, 3] > 0.0) & np.all((px >= 0.0) & (px < np.asarray(buffers.size)), axis=1)
+    at, found = np.zeros((*tried.shape, 2)), np.zeros(tried.shape, bool)
+    at[tried], found[tried] = px, inside
+    return at, found
+
+
+def eye_layers(
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int] = (640, 360),
+    method: str = "none",
+    rounds: int = 3,
+    backend: str = "auto",
+) -> dict[int, LayerShares]:
+    """One and two depth layers on one view. `rounds`: frames that a cost is the median of, in turns; 0: no costs.
+
+    Raises:
+        UsageError: embreex is not installed.
+    """
+    meshes = tuple(beam_mesh(i) for i in scene.instances_at(0.0) if i.optical_kind is OpticalKind.DIFFUSE)
+    with create_device(backend) as device:
+        truth, found = true_pixels(RayCaster(BeamScene(meshes, ())), scene_buffers(device, scene, camera, size))
+    still = replace(scene, camera=camera, camera_at=None)
+    shares: dict[int, LayerShares] = {}
+    with ExitStack() as stack:
+        made: dict[int, Any] = {
+            layers: stack.enter_context(
+                Renderer(
+                    still,
+                    size,
+                    method,
+                    backend=backend,
+                    aovs=("solve_status", "solve_hit"),
+                    options={"depth_layers": layers, "refraction_steps": 16384},
+                )
+            )
+            for layers in (1, 2)
+        }
+        pictures = {layers: renderer.render().aov for layers, renderer in made.items()}
+        costs = _costs(made, rounds)
+        for renderer in made.values():
+            renderer.device.make_current()
+    for layers, aov in pictures.items():
+        status = aov["solve_status"][::-1][found]
+        px = aov["solve_hit"][::-1][found][:, :2] * np.asarray(size)
+        near, solved = np.abs(px - truth[found]).max(axis=1) <= 1.0, np.isin(status, SOLVED)
+        second = status == SECOND
+        shares[layers] = LayerShares(
+            int(found.sum()),
+            float((solved & near).mean()),
+            float((solved & ~near).mean()),
+            float((status == HIDDEN).mean()),
+            float(second.mean()),
+            float(near[second].mean()) if second.any() else 0.0,
+            costs[layers] / costs[1],
+        )
+    return shares
+
+
+def _costs(made: dict[int, Any], rounds: int) -> dict[int, float]:
+    """Median processor seconds of a frame, the renderers in turns."""
+    times: dict[int, list[float]] = {layers: [] for layers in made}
+    for _ in range(rounds):
+        for layers, renderer in made.items():
+            renderer.device.make_current()
+            start = time.process_time()
+            renderer.draw()
+            renderer.device.ctx.finish()
+            times[layers].append(time.process_time() - start)
+    return {layers: statistics.median(values) if values else 1.0 for layers, values in times.items()}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """`python -m glcaustics.bench.eye_layers SCENE`: shares and cost with one and two depth layers, seeded views."""
+    parser = argparse.ArgumentParser(prog="python -m glcaustics.bench.eye_layers", description=main.__doc__)
+    parser.add_argument("scene", nargs="+")
+    parser.add_argument("--views", type=int, default=2)
+    parser.add_argument("--size", default="640x360")
+    parser.add_argument("--method", default="none", help="caustics method, for the cost of the whole frame")
+    parser.add_argument("--rounds", type=int, default=3, help="frames a cost is the median of; 0: no costs")
+    parser.add_argument("--backend", default="auto")
+    chosen = parser.parse_args(arguments)
+    width, height = map(int, chosen.size.split("x"))
+    print("scene view layers     rays  right  wrong hidden second (right) cost")
+    for name in chosen.scene:
+        scene = load_scene(name)
+        for view, camera in enumerate(seeded_cameras(scene, chosen.views)):
+            found = eye_layers(scene, camera, (width, height), chosen.method, chosen.rounds, chosen.backend)
+            for layers, row in found.items():
+                print(
+                    f"{name:12s} {view} {layers} {row.rays:8d}  {row.right:.3f}  {row.wrong:.3f}  {row.hidden:.3f}  "
+                    f"{row.second:.3f}  {row.second_right:.3f}  {row.cost:.2f}",
+                    flush=True,
+                )
+
+
+if __name__ == "__main__":
+    main()
