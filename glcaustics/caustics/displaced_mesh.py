@@ -19,6 +19,7 @@ from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext, Receive
 from glcaustics.passes.runner import PlanRunner
 
 SHADERS = "caustics/displaced_mesh"
+FACED_STAGES = ("vertex", "cell", "mesh")  # which carry vertices over to another face of a cube
 WARPED_STAGES = ("vertex", "leftover")
 
 
@@ -189,7 +190,7 @@ class DisplacedMesh(LightMapMethod):
         assert light.caster is not None
         view = receiver.view
         defines = {"RECEIVER_FACES": view.faces}
-        if stage == "vertex":
+        if stage in ("vertex", "leftover"):
             defines["CASTER_FACES"] = light.caster.faces
         if stage in WARPED_STAGES:
             defines["WARP"] = self.warp_define(light, receiver)
@@ -197,7 +198,7 @@ class DisplacedMesh(LightMapMethod):
         if stage in WARPED_STAGES:
             self.set_warp(program, ctx, light, receiver)
         program.set_all(view.uniforms("receiver"))
-        if view.faces == 6 and stage != "project":
+        if view.faces == 6 and stage in FACED_STAGES:
             program.set(t_landing=ctx.texture(branch.landing))
         return program
 

@@ -22,6 +22,9 @@ layout(location = 1) out vec4 o_conic;  // xyz: inverse covariance (a, b, c); w:
 layout(location = 2) out vec4 o_drawn;  // rgb: flux of the vertex in the triangles, W or lm; w: signed determinant
 
 const float PIXEL_VARIANCE = 0.2;   // texels^2: the map's own filter
+#if CASTER_FACES == 6
+const float CUBE_RAMP = 10.0;       // vertices
+#endif
 const float CUTOFF = 7.0;           // squared Mahalanobis radius where the kernel ends; SPLAT_CUTOFF in splat.frag
 
 // Share of a vertex's flux that the triangles around it draw: they fade out towards an edge or an unresolved cell. `excess`: by how
@@ -36,6 +39,12 @@ float drawn_share(ivec2 texel, out float excess) {
         count += weight.y > 0.0 ? 1.0 : 0.0;
     }
     excess = count > 0.0 ? sum / count : 1.0;
+#if CASTER_FACES == 6
+    // Between faces of the casters' cube there are no cells. Splats blur the share by 1/2 sigma^2 share'': it has to change slowly.
+    ivec2 tile = textureSize(t_vertex, 0) / ivec2(3, 2), at = texel % tile;
+    ivec2 to_border = min(at, tile - 1 - at);
+    share *= smoothstep(0.0, CUBE_RAMP, float(min(to_border.x, to_border.y)));
+#endif
     return share;
 }
 
