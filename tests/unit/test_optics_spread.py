@@ -84,9 +84,11 @@ def test_visible_normals_scatter_light_as_walters_formulas_say(roughness: float,
     assert sampled == pytest.approx(exact, abs=2e-3 * exact[0]), (sampled, exact)
 
 
-def disc_through_flat_water(theta: float, radius: float, edges: FloatArray, depth_m: float) -> FloatArray:
-    """Irradiance (Z, X) of the floor under |x|, |z| <= 0.5 of flat water in light of an even disc: the closed form of
-    directional light, integrated over the disc.
+def disc_through_flat_water(
+    theta: float, radius: float, edges: FloatArray, depth_m: float, half_m: float = 0.5
+) -> FloatArray:
+    """Irradiance (Z, X) of the floor under |x|, |z| <= half_m of flat water in light of an even disc: the closed form
+    of directional light, integrated over the disc.
     """
     total = np.zeros((edges.size - 1,) * 2)
     rings, spokes = 12, 24
@@ -99,8 +101,8 @@ def disc_through_flat_water(theta: float, radius: float, edges: FloatArray, dept
             tilt = math.acos(y)
             value = float(flat_directional_irradiance(tilt, ior=1.333)) / c  # per unit of irradiance across the axis
             shift = float(flat_directional_shift_m(tilt, depth_m, ior=1.333)) / max(math.hypot(x, z), 1e-12)
-            lit_z = interval_coverage(edges, -0.5 + shift * z, 0.5 + shift * z)
-            total += value * np.outer(lit_z, interval_coverage(edges, -0.5 + shift * x, 0.5 + shift * x))
+            lit_z = interval_coverage(edges, -half_m + shift * z, half_m + shift * z)
+            total += value * np.outer(lit_z, interval_coverage(edges, -half_m + shift * x, half_m + shift * x))
     return total / (rings * spokes)
 
 
@@ -170,16 +172,16 @@ def lobe_on_the_floor(
     incoming: FloatArray, half_m: float, depth_m: float, alpha: float, extent_m: float, bins: int, ior: float = 1.333
 ) -> FloatArray:
     """Irradiance (bins, bins) of the floor by a window |x|, |z| <= half of rough water in unit directional light."""
-    fine = bins * 8
+    fine = bins * 4
     x = ((np.arange(fine) + 0.5) / fine * 2.0 - 1.0) * extent_m
     floor = np.stack([*np.meshgrid(x, x)], -1)
     total = np.zeros((fine, fine))
-    w = ((np.arange(12) + 0.5) / 12 * 2.0 - 1.0) * half_m
+    w = ((np.arange(32) + 0.5) / 32 * 2.0 - 1.0) * half_m
     for wx in w:
         for wz in w:
             out = np.stack([floor[..., 0] - wx, np.full((fine, fine), -depth_m), floor[..., 1] - wz], -1)
             distance = np.linalg.norm(out, axis=-1)
             out /= distance[..., None]
             total += rough_transmission(incoming, out, UP, alpha, ior) * -out[..., 1] / distance**2
-    flux = (2.0 * half_m) ** 2 * -float(incoming[1]) / 144.0
-    return np.asarray((flux * total).reshape(bins, 8, bins, 8).mean(axis=(1, 3)))
+    flux = (2.0 * half_m) ** 2 * -float(incoming[1]) / 1024.0
+    return np.asarray((flux * total).reshape(bins, 4, bins, 4).mean(axis=(1, 3)))
