@@ -171,17 +171,17 @@ def test_rough_beams_land_as_walters_formula_says() -> None:
 def lobe_on_the_floor(
     incoming: FloatArray, half_m: float, depth_m: float, alpha: float, extent_m: float, bins: int, ior: float = 1.333
 ) -> FloatArray:
-    """Irradiance (bins, bins) of the floor by a window |x|, |z| <= half of rough water in unit directional light."""
-    fine = bins * 4
-    x = ((np.arange(fine) + 0.5) / fine * 2.0 - 1.0) * extent_m
-    floor = np.stack([*np.meshgrid(x, x)], -1)
-    total = np.zeros((fine, fine))
-    w = ((np.arange(32) + 0.5) / 32 * 2.0 - 1.0) * half_m
-    for wx in w:
-        for wz in w:
-            out = np.stack([floor[..., 0] - wx, np.full((fine, fine), -depth_m), floor[..., 1] - wz], -1)
-            distance = np.linalg.norm(out, axis=-1)
-            out /= distance[..., None]
-            total += rough_transmission(incoming, out, UP, alpha, ior) * -out[..., 1] / distance**2
-    flux = (2.0 * half_m) ** 2 * -float(incoming[1]) / 1024.0
-    return np.asarray((flux * total).reshape(bins, 4, bins, 4).mean(axis=(1, 3)))
+    """Irradiance (bins, bins) of the floor by a window |x|, |z| <= half of rough water in unit directional light: the
+    lobe summed over the window, which holds a whole number of steps of 1/12 bin.
+    """
+    step = 2.0 * extent_m / (12 * bins)
+    wide, fine = round(2.0 * half_m / step), 12 * bins
+    assert math.isclose(wide * step, 2.0 * half_m)
+    x = (np.arange(fine + wide - 1) - 0.5 * (fine + wide - 2)) * step  # floor point minus window point
+    out = np.stack(np.broadcast_arrays(x[None, :], -depth_m, x[:, None]), -1)
+    distance = np.linalg.norm(out, axis=-1)
+    out = out / distance[..., None]
+    lobe = rough_transmission(incoming, out, UP, alpha, ior) * -out[..., 1] / distance**2
+    total = np.pad(lobe.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    total = total[wide:, wide:] - total[:-wide, wide:] - total[wide:, :-wide] + total[:-wide, :-wide]
+    return np.asarray(total.reshape(bins, 12, bins, 12).mean(axis=(1, 3)) * (step**2 * -float(incoming[1])))
