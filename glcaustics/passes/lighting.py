@@ -23,7 +23,7 @@ def declare_lighting(graph: FrameGraph, setup: FrameSetup, layer: str = "") -> N
                 f"lighting{layer}.highlight": TextureDesc("rgba32f", setup.size, "cd/m^2"),
             },
             lambda ctx: _execute_lighting(ctx, layer),
-            reads=(f"{surface}.depth_m", f"{surface}.normal_ws"),
+            reads=(f"{surface}.depth_m", f"{surface}.normal_ws", *((f"{surface}.depth",) if layer else ())),
             optional=(
                 *(light.resource("shadow.depth") for light in setup.lights if light.shadow is not None),
                 *((f"{surface}.albedo", f"{surface}.material") if has_highlights(setup) else ()),
@@ -43,8 +43,9 @@ def _execute_lighting(ctx: PassContext, layer: str) -> None:
     surface = f"gbuffer{layer}"
     outputs = (f"lighting{layer}.irradiance", f"lighting{layer}.highlight")
     highlight = ctx.live(outputs[1]) and ctx.has(f"{surface}.material")
-    target = ctx.target(*outputs)
-    target.clear(0.0, 0.0, 0.0, 0.0)
+    ctx.target(*outputs).clear(0.0, 0.0, 0.0, 0.0)
+    # The second layer is mostly empty: its depth buffer keeps the shader from running there.
+    target = ctx.target(*outputs, depth=f"{surface}.depth" if layer else None)
     textures: dict[str, Any] = {
         "t_depth_m": ctx.texture(f"{surface}.depth_m"),
         "t_normal_ws": ctx.texture(f"{surface}.normal_ws"),
@@ -52,10 +53,12 @@ def _execute_lighting(ctx: PassContext, layer: str) -> None:
     if highlight:
         textures |= {"t_albedo": ctx.texture(f"{surface}.albedo"), "t_material": ctx.texture(f"{surface}.material")}
     for light in ctx.setup.lights:
-        _draw_light(ctx, light, target, textures, highlight)
+        _draw_light(ctx, light, target, textures, highlight, masked=bool(layer))
 
 
-def _draw_light(ctx: PassContext, light: LightSetup, target: Any, textures: dict[str, Any], highlight: bool) -> None:
+def _draw_light(
+    ctx: PassContext, light: LightSetup, target: Any, textures: dict[str, Any], highlight: bool, *, masked: bool
+) -> None:
     defines = {"HAS_HIGHLIGHT": int(highlight), "HAS_SHADOW": int(light.shadow is not None)}
     values = {**ctx.frame.uniforms(), **light_uniforms(light.light), **textures}
     if light.shadow is not None:
@@ -67,7 +70,7 @@ def _draw_light(ctx: PassContext, light: LightSetup, target: Any, textures: dict
         }
     program = ctx.device.program("passes/lighting/lighting", defines)
     program.set_all(values)
-    ctx.device.draw_fullscreen(program, target, blend="add")
+    ctx.device.draw_fullscreen(program, target, blend="add", depth_func=">" if masked else None)
 
 
 def declare_shade(graph: FrameGraph, setup: FrameSetup, layer: str = "") -> None:

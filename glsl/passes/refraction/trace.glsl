@@ -121,9 +121,9 @@ Seen look_sousa(GlcRasterRay ray, vec3 p, vec3 d) {
 }
 
 #if USE_MARCH == 1
-#define MARCH(ray, steps) glc_march_dda(t_opaque_depth_m, t_plane, ORTHOGRAPHIC == 1, ray, steps)
+#define MARCH(ray, steps, in_view) glc_march_dda(t_opaque_depth_m, t_plane, ORTHOGRAPHIC == 1, ray, steps, in_view)
 #elif USE_MARCH == 2
-#define MARCH(ray, steps) glc_march_hierarchical(t_bounds, t_plane, ray, steps)
+#define MARCH(ray, steps, in_view) glc_march_hierarchical(t_bounds, t_plane, ray, steps, in_view)
 #endif
 
 // Along a refracted ray. solved: false where a later stage should look again.
@@ -134,19 +134,21 @@ Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved) {
 #else
     GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_DIVERGED, 0);
     float status = GLC_VIEW_NEWTON;
+    bool in_view = false;
 #if USE_NEWTON
     solve = glc_newton(t_plane, ray, 1.0, u_refraction_iterations);
+    in_view = solve.status == GLC_SOLVE_HIT;
 #endif
 #if USE_MARCH
     if (solve.status != GLC_SOLVE_HIT) {
         int before = solve.iterations;
-        solve = MARCH(ray, u_refraction_steps);
+        solve = MARCH(ray, u_refraction_steps, in_view);
         solve.iterations += before;
         status = GLC_VIEW_MARCHED;
     }
 #endif
 #if HAS_SECOND
-    look_behind(ray, u_refraction_steps, solve, status);
+    if (!in_view) look_behind(ray, u_refraction_steps, solve, status);
 #endif
     solved = solve.status == GLC_SOLVE_HIT;
     vec2 uv = (ray.start.xy + solve.u * ray.step.xy) / u_raster_size;
@@ -173,11 +175,11 @@ Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved) {
 Seen look_along(vec3 p, vec3 d) {
 #if USE_MARCH
     GlcRasterRay ray = eye_ray(p, d);
-    GlcSolve solve = MARCH(ray, u_reflection_steps);
+    bool mixes, in_view;
+    GlcSolve solve = MARCH(ray, u_reflection_steps, in_view);
     float status = GLC_VIEW_MARCHED;
-    bool mixes;
 #if HAS_SECOND
-    look_behind(ray, u_reflection_steps, solve, status);
+    if (!in_view) look_behind(ray, u_reflection_steps, solve, status);
 #endif
     if (solve.status == GLC_SOLVE_HIT)
         return seen_hit(ray, solve, status, mixes);
