@@ -18,6 +18,7 @@ from glcaustics.bench.mitsuba_view import ViewPtracer, view_ptracer_reference
 from glcaustics.bench.peers import PtracerPeer, has_denoiser
 from glcaustics.bench.photons import (
     KEPT_FRAMES,
+    QUALITY,
     final_picture,
     photon_options,
     picture_with,
@@ -113,21 +114,21 @@ class PhotonsPart:
 
     # -- frames of a still --------------------------------------------------------------------------------------------
 
-    def _frames(self, scene: Scene, side: int, photons: int) -> Measured:
+    def _frames(self, scene: Scene, side: int, what: str, options: dict[str, Any]) -> Measured:
         p = self.settings
-        options = photon_options(photons, p.view_size)
 
         def make() -> Measured:
             return static_frames(scene, side, p.filtered, p.frames, options, self.cells.backend)
 
         key = self._key(scene, "frames", side, p.filtered, p.frames, options)
-        return self.cells.cell(f"{scene.name}: {p.frames} frames of {photons} photons, {side}^2", key, make)
+        return self.cells.cell(f"{scene.name}: {p.frames} frames, {what}, {side}^2", key, make)
 
     def _static(self, scene: Scene, truth: ViewReference) -> list[dict[str, Any]]:
         """Errors of irradiance, all channels, over all pixels and over those that show one surface alone."""
         p, found = self.settings, []
         for photons in p.photons:
-            document, arrays = self._frames(scene, p.side, photons)
+            options = photon_options(photons, p.view_size)
+            document, arrays = self._frames(scene, p.side, f"{photons} photons", options)
             series = [{"frames": number, **_errors(truth, arrays[f"frame {number}"])} for number in self._kept_frames()]
             found.append({"photons": photons, "side": p.side, **document, "series": series, **series[-1]})
             self.images[f"{scene.name} view {photons}"] = luminance(arrays[f"frame {p.frames}"])
@@ -189,12 +190,11 @@ class PhotonsPart:
             row = row | {"errors": {"rrmse": _masked(halves, image, mask)}}
             (clean_rows if "oidn" in row["method"] else rows).append(row)
         ours = []
-        photons = p.photons[0]
-        document, arrays = self._frames(scene, p.filtered, photons)
+        document, arrays = self._frames(scene, p.filtered, QUALITY, {})
         for number in self._kept_frames():
             error = _masked(halves, luminance(arrays[f"frame {number}"]), mask)
             entry = compare(error, number * document["frame_ms"], rows, clean_rows)
-            ours.append(entry | {"frames": number, "photons": photons})
+            ours.append(entry | {"frames": number, "quality": QUALITY})
         return {
             "pixels": p.filtered,
             "share": float(mask.mean()),

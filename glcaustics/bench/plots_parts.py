@@ -24,7 +24,7 @@ def _photons(one: Mapping[str, Any]) -> bytes:
     figure, axes = log_axes(
         f"{one['scene']}, what the eye sees directly", "time, ms (wall clock)", "relative RMSE of irradiance"
     )
-    label = f"photon_trace, {equal['ours'][0]['photons']} photons a frame" if equal["ours"] else ""
+    label = f"photon_trace {equal['ours'][0]['quality']}" if equal["ours"] else ""
     curves = [
         (label, equal["ours"], "-"),
         ("ptracer", equal["ptracer"], "--"),

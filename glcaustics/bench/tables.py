@@ -118,7 +118,7 @@ def _static_table(one: Mapping[str, Any]) -> Table:
 def _equal_time_table(one: Mapping[str, Any]) -> Table:
     equal, rows = one["equal"], []
     for e in equal["ours"]:
-        cells = [f"photon_trace, {e['frames']} frames of {e['photons']}", f"{e['ms']:.0f}", f"{e['rrmse']:.4f}"]
+        cells = [f"photon_trace {e['quality']}, {e['frames']} frames", f"{e['ms']:.0f}", f"{e['rrmse']:.4f}"]
         rows.append([*cells, ratio_text(e, PTRACER), ratio_text(e, DENOISED)])
     for name in (PTRACER, DENOISED):
         rows += [

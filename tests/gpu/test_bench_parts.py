@@ -1,0 +1,97 @@
+"""The bench's instruments that need a renderer, at tiny sizes: given irradiance, static frames, stages, hits."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+
+import glcaustics as glc
+from glcaustics.bench.given import given_irradiance
+from glcaustics.bench.photons import (
+    MARCHES,
+    STAGES,
+    final_picture,
+    photon_options,
+    picture_with,
+    same_hits,
+    stage_table,
+    stages_of,
+    static_frames,
+)
+from glcaustics.caustics.registry import METHODS
+from glcaustics.errors import UsageError
+from glcaustics.scene.model import Camera, Scene
+from tests.gpu.feature_scenes import box, plane, scene_of, sheet, sun
+
+pytestmark = pytest.mark.gpu
+BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
+SIZE = (48, 48)
+
+
+def room() -> Scene:
+    """Flat water over a floor, a box beside it that catches what the water throws back; seen from a corner."""
+    parts = [plane("floor", 3.0, -1.0), sheet("water", 1.0, 0.0), box("wall", (0.1, 2.0, 2.0), (1.6, 1.0, 0.0))]
+    return scene_of(parts, [sun(45.0)], Camera.look_at((-2.5, 2.5, 2.0), (0.4, 0.0, 0.0), yfov_rad=0.8))
+
+
+def test_a_given_irradiance_makes_the_frame_of_the_method_that_made_it() -> None:
+    """Bit for bit, water and all; and the registry is as it was."""
+    scene, before = room(), dict(METHODS)
+    options = {"caster_size": 64, "map_size": 64}
+    with glc.Renderer(
+        scene, SIZE, "caustic_map", "medium", BACKEND,
+        aovs=("caustic_irradiance",), specular_view=False, options=options,
+    ) as renderer:  # fmt: skip
+        irradiance = renderer.render().aov["caustic_irradiance"]
+    with glc.Renderer(scene, SIZE, "caustic_map", "medium", BACKEND, options=options) as renderer:
+        expected = renderer.render().ldr
+    with glc.Renderer(scene, SIZE, "none", "medium", BACKEND) as renderer:
+        dark = renderer.render().ldr
+    assert np.array_equal(picture_with(scene, irradiance, 1, BACKEND), expected)
+    assert not np.array_equal(dark, expected)
+    assert dict(METHODS) == before
+
+
+def test_a_given_irradiance_of_another_size_is_refused() -> None:
+    scene = room()
+    with given_irradiance(np.zeros((8, 9, 3), np.float32)) as name, pytest.raises(UsageError, match="9x8"):
+        with glc.Renderer(scene, SIZE, name, backend=BACKEND) as renderer:
+            renderer.render()
+
+
+def test_static_frames_are_those_of_the_renderer() -> None:
+    scene, options = room(), photon_options(2000, 64)
+    document, arrays = static_frames(scene, 32, 16, 4, options, BACKEND)
+    assert sorted(arrays) == ["frame 1", "frame 2", "frame 4"]
+    assert document["frame_ms"] > 0.0 and arrays["frame 4"].shape == (16, 16, 3)
+    with glc.Renderer(
+        scene, (32, 32), "photon_trace", "medium", BACKEND,
+        aovs=("caustic_irradiance",), specular_view=False, options=options,
+    ) as renderer:  # fmt: skip
+        frames = [renderer.render().aov["caustic_irradiance"] for _ in range(4)]
+    mean = frames[-1].astype(np.float64).reshape(16, 2, 16, 2, 3).mean(axis=(1, 3))
+    assert arrays["frame 4"] == pytest.approx(mean, rel=1e-5, abs=1e-5 * mean.mean())
+    assert final_picture(scene, (32, 32), 2, options, BACKEND).shape == (32, 32, 3)
+
+
+def test_stages_and_hits_of_both_marches() -> None:
+    rows = stage_table(room(), SIZE, [3000], 64, 1, BACKEND)
+    assert [row["march"] for row in rows] == list(MARCHES)
+    for row in rows:
+        assert set(row["ms"]) == set(STAGES) and all(row["ms"].values())
+    assert rows[0]["same_hits"]["photons"] > 1000 and rows[0]["same_hits"]["share"] > 0.98
+
+
+def test_stages_are_told_by_name() -> None:
+    timings = {"photon_trace.trace@0": 3.0, "photon_trace.scatter": 2.0, "svgf.atrous_0": 1.0, "svgf.atrous_0/x": 9.0}
+    found = stages_of(timings | {"depth_chain.4": 4.0, "shade": 7.0})
+    assert found == {"tracing": 3.0, "storing": 2.0, "denoising": 1.0, "buffers": 4.0}
+
+
+def test_hits_are_the_same_within_one_pixel() -> None:
+    """Columns: x, y, inverse area, status (1, 2 landed)."""
+    exact = np.array([[[5.5, 5.5, 1, 1], [5.5, 5.5, 1, 2], [5.5, 5.5, 1, 2], [0, 0, 0, -2]]], float)
+    ours = np.array([[[6.4, 5.5, 1, 1], [7.5, 5.5, 1, 2], [5.5, 4.5, 1, 1], [3, 3, 1, 1]]], float)
+    assert same_hits([ours], [exact]) == {"share": 2 / 3, "photons": 3, "marched": 0.5, "marched_photons": 2}
