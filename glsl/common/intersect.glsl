@@ -1,13 +1,17 @@
 #include "common/light_view.glsl"
 
 // Where a ray meets a surface that is known as positions + normals in a light's view (Shah, Konttinen, Pattanaik 2007,
-// sec. III C and appendix). Three estimates of the distance t along the ray:
-//   GLC_FIXED_POINT  t' = |X(o + t d) - o|                                            (their sec. III C)
+// sec. III C and appendix; Mayer, Assarsson, Sintorn 2026, sec. 2). Three estimates of the distance t along the ray:
+//   GLC_FIXED_POINT  t' = |X(o + t d) - o|                                            (Shah et al., sec. III C)
 //   GLC_NEWTON_FD    Newton on the signed light distance, derivative by finite difference  (their appendix)
-//   GLC_HYBRID       safeguarded secant that bisects when iterates alternate, then a bracketing march for the rest
+//   GLC_HYBRID       Newton on tangent planes (Mayer et al.), within a bracket: where the plane leads out of it the secant does,
+//                    or bisection; then a bracketing march for the rest
 // X(p) is the stored position at the texel that p projects to. Theirs starts at d = 1 and uses eps = 0.1 scene units; here the
 // start is the distance to the surface straight behind the ray's origin, and lengths are counted in texel widths: scale-free.
 // Every estimate ends on the tangent plane at the last texel: exact on planes, second order on curved surfaces.
+// Pure functions, no uniforms. Of all of them:
+//   t_position: rgba32f, world space, metres, w = 0 where nothing is stored; t_normal: world space, towards the light
+//   view: that both are seen by; o, d: the ray's origin (metres) and unit direction, world space; t_max: its end, metres
 
 #define GLC_FIXED_POINT 0
 #define GLC_NEWTON_FD 1
@@ -34,6 +38,7 @@ struct GlcProbe {
     vec3 surface_ws;
 };
 
+// Looks the surface up that the view sees where p_ws is; far_m: the gap (metres) where it sees nothing.
 GlcProbe glc_probe(sampler2D t_position, GlcView view, vec3 p_ws, float far_m) {
     vec3 projected = glc_view_project(view, p_ws);
     GlcProbe probe = GlcProbe(far_m, false, ivec2(projected.xy), p_ws);
@@ -46,9 +51,14 @@ GlcProbe glc_probe(sampler2D t_position, GlcView view, vec3 p_ws, float far_m) {
     return probe;
 }
 
-// Accepts the ray's point on the tangent plane at the probed texel when it lies within `reach` texel widths of the texel.
-bool glc_settle(sampler2D t_normal, GlcView view, GlcProbe probe, vec3 o, vec3 d, float reach, inout GlcHit hit) {
-    vec3 n = glc_safe_normalize(texelFetch(t_normal, probe.texel, 0).xyz, -d);
+// Unit normal at a probed texel, world space; against the ray where none is stored.
+vec3 glc_probe_normal(sampler2D t_normal, GlcProbe probe, vec3 d) {
+    return glc_safe_normalize(texelFetch(t_normal, probe.texel, 0).xyz, -d);
+}
+
+// Accepts the ray's point on the tangent plane (unit normal n) at the probed texel when it lies within `reach` texel widths of the
+// texel, across the light; sets t, position and normal of the hit.
+bool glc_settle(vec3 n, GlcView view, GlcProbe probe, vec3 o, vec3 d, float reach, inout GlcHit hit) {
     float d_n = dot(d, n);
     float width = glc_texel_width(view, probe.surface_ws);
     float t = abs(d_n) > 1e-3 ? dot(probe.surface_ws - o, n) / d_n : hit.t;
@@ -67,7 +77,7 @@ bool glc_settle(sampler2D t_normal, GlcView view, GlcProbe probe, vec3 o, vec3 d
 const float GLC_REACH = 1.5;  // texel widths: half a texel's diagonal, plus one for the step still to go
 
 // Bracketing march over (0, t_max]: finds the first crossing from in front of the surface to behind it that really is the
-// surface (a ray that passes behind an occluder crosses too, but does not settle).
+// surface (a ray that passes behind an occluder crosses too, but does not settle). steps: of equal length, 0 = none.
 GlcHit glc_intersect_march(sampler2D t_position, sampler2D t_normal, GlcView view, vec3 o, vec3 d, float t_max, int steps) {
     GlcHit hit = GlcHit(0.0, o, -d, 0, GLC_LEFT);
     float t_front = 0.0;
@@ -86,7 +96,7 @@ GlcHit glc_intersect_march(sampler2D t_position, sampler2D t_normal, GlcView vie
         }
         hit.iterations += 10;
         hit.t = hi;
-        if (glc_settle(t_normal, view, probe, o, d, GLC_REACH, hit)) { hit.status = GLC_BRACKETED; return hit; }
+        if (glc_settle(glc_probe_normal(t_normal, probe, d), view, probe, o, d, GLC_REACH, hit)) { hit.status = GLC_BRACKETED; return hit; }
         in_front = false;
         t_front = t;
     }
@@ -94,6 +104,8 @@ GlcHit glc_intersect_march(sampler2D t_position, sampler2D t_normal, GlcView vie
     return hit;
 }
 
+// estimate: GLC_FIXED_POINT, GLC_NEWTON_FD or GLC_HYBRID; max_iterations of it; march_steps: of GLC_HYBRID's fallback, 0 = none.
+// Where it fails without one, t and position_ws are those of the last estimate.
 GlcHit glc_intersect(sampler2D t_position, sampler2D t_normal, GlcView view, vec3 o, vec3 d, float t_max,
                      int estimate, int max_iterations, int march_steps) {
     GlcHit hit = GlcHit(0.0, o, -d, 0, GLC_UNCONVERGED);
@@ -108,10 +120,14 @@ GlcHit glc_intersect(sampler2D t_position, sampler2D t_normal, GlcView view, vec
         GlcProbe probe = glc_probe(t_position, view, p, t_max);
         hit.iterations += 1;
         hit.t = t;
+        float t_plane = -1.0;
         if (probe.valid) {
-            float width = glc_texel_width(view, probe.surface_ws);
-            // The normal is fetched only where the surface is near: most iterates need one look-up.
-            if (abs(probe.gap) < 6.0 * width && glc_settle(t_normal, view, probe, o, d, GLC_REACH, hit)) {
+            vec3 n = glc_probe_normal(t_normal, probe, d);
+            float d_n = dot(d, n);
+            if (abs(d_n) > 1e-3) t_plane = dot(probe.surface_ws - o, n) / d_n;
+            // Farther off, a plane that happens to be met beside its texel is another surface as often as not.
+            bool close = abs(probe.gap) < 6.0 * glc_texel_width(view, probe.surface_ws);
+            if (close && glc_settle(n, view, probe, o, d, GLC_REACH, hit)) {
                 hit.status = GLC_CONVERGED;
                 return hit;
             }
@@ -127,9 +143,13 @@ GlcHit glc_intersect(sampler2D t_position, sampler2D t_normal, GlcView view, vec
         } else {
             if (probe.gap > 0.0) { lo = t; } else { hi = t; bracketed = true; }
             float rise = probe.gap - gap_before;
-            next = abs(rise) > 1e-6 * t_max ? t - probe.gap * (t - t_before) / rise : 0.5 * (lo + hi);
-            float margin = 0.02 * (hi - lo);
-            if (bracketed && (next <= lo + margin || next >= hi - margin)) next = 0.5 * (lo + hi);
+            if (t_plane > lo && t_plane < hi) {
+                next = t_plane;
+            } else {
+                next = abs(rise) > 1e-6 * t_max ? t - probe.gap * (t - t_before) / rise : 0.5 * (lo + hi);
+                float margin = 0.02 * (hi - lo);
+                if (bracketed && (next <= lo + margin || next >= hi - margin)) next = 0.5 * (lo + hi);
+            }
         }
         t_before = t;
         gap_before = probe.gap;

@@ -41,8 +41,8 @@ GlcHit glc_leave_inside(sampler2D t_front, sampler2D t_front_normal, sampler2D t
         hit.t = hi;
         bool settled = false;
         if (last.valid) {
-            if (through_front) settled = glc_settle(t_front_normal, view, last, o, d, 2.0 * GLC_REACH, hit);
-            else settled = glc_settle(t_back_normal, view, last, o, d, 2.0 * GLC_REACH, hit);
+            if (through_front) settled = glc_settle(glc_probe_normal(t_front_normal, last, d), view, last, o, d, 2.0 * GLC_REACH, hit);
+            else settled = glc_settle(glc_probe_normal(t_back_normal, last, d), view, last, o, d, 2.0 * GLC_REACH, hit);
         }
         if (settled) hit.status = GLC_BRACKETED;
         return hit;
