@@ -14,8 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from glcaustics.bench.convergence import seeded_cameras
+from glcaustics.bench.eye_truth import has_open_surface
 from glcaustics.bench.scene_export import beam_mesh
 from glcaustics.bench.solver_variants import Buffers, scene_buffers
+from glcaustics.errors import UsageError
 from glcaustics.gpu import create_device
 from glcaustics.optics.beam_scene import BeamScene
 from glcaustics.optics.raycast import RayCaster
@@ -72,8 +74,10 @@ def eye_layers(
     """One and two depth layers on one view. `rounds`: frames that a cost is the median of, in turns; 0: no costs.
 
     Raises:
-        UsageError: embreex is not installed.
+        UsageError: no open surface such as water in the scene, or embreex is not installed.
     """
+    if not has_open_surface(scene):
+        raise UsageError(f"scene '{scene.name}' has no open surface", where="eye_layers", remedy="take one with water")
     meshes = tuple(beam_mesh(i) for i in scene.instances_at(0.0) if i.optical_kind is OpticalKind.DIFFUSE)
     with create_device(backend) as device:
         truth, found = true_pixels(RayCaster(BeamScene(meshes, ())), scene_buffers(device, scene, camera, size))
@@ -97,6 +101,8 @@ def eye_layers(
         costs = _costs(made, rounds)
         for renderer in made.values():
             renderer.device.make_current()
+    if not found.any():
+        raise UsageError(f"no refracted ray of scene '{scene.name}' ends within the picture", where="eye_layers")
     for layers, aov in pictures.items():
         status = aov["solve_status"][::-1][found]
         px = aov["solve_hit"][::-1][found][:, :2] * np.asarray(size)
