@@ -1,7 +1,8 @@
 #include "common/optics.glsl"
 
 // Views from a light: one orthographic or perspective frustum, or six 90-degree faces in a 3x2 atlas (cube map of a
-// point light; moderngl attaches no cube faces). Pure functions over a GlcView, no uniforms.
+// point light; moderngl attaches no cube faces). Pure functions over a GlcView, no uniforms. Points p_ws: world space, metres.
+// Sources: perspective views of a lamp, Williams 1978; the solid angle of a texel (cos^3 off the axis), Pharr et al. 2023.
 
 struct GlcView {
     mat4 clip_from_world;  // the single frustum; unused by a cube
@@ -12,7 +13,7 @@ struct GlcView {
     int faces;             // 1, or 6
 };
 
-// Right, up and forward axis of a cube face: +X -X +Y -Y +Z -Z.
+// Right, up and forward axis (world space, unit) of a cube face: +X -X +Y -Y +Z -Z.
 void glc_cube_axes(int face, out vec3 right, out vec3 up, out vec3 forward) {
     float s = (face & 1) == 0 ? 1.0 : -1.0;
     if (face < 2) { forward = vec3(s, 0, 0); up = vec3(0, 1, 0); }
@@ -21,6 +22,7 @@ void glc_cube_axes(int face, out vec3 right, out vec3 up, out vec3 forward) {
     right = cross(forward, up);
 }
 
+// The face that a direction d (world space, any length but zero) leaves through.
 int glc_cube_face(vec3 d) {
     vec3 a = abs(d);
     if (a.x >= a.y && a.x >= a.z) return d.x >= 0.0 ? 0 : 1;
@@ -28,6 +30,7 @@ int glc_cube_face(vec3 d) {
     return d.z >= 0.0 ? 4 : 5;
 }
 
+// The face that sees a world point; 0 of a single frustum.
 int glc_view_face(GlcView view, vec3 p_ws) {
     return view.faces == 1 ? 0 : glc_cube_face(p_ws - view.light.xyz);
 }
@@ -48,6 +51,7 @@ vec3 glc_view_project_on(GlcView view, vec3 p_ws, int face) {
     return vec3((vec2(face % 3, face / 3) + tan_xy * 0.5 + 0.5) * tile_size, depth);
 }
 
+// Texel coordinates of a world point in the face that sees it; z > 0 where the point is in front of the light.
 vec3 glc_view_project(GlcView view, vec3 p_ws) {
     int face = glc_view_face(view, p_ws);
     vec3 projected = glc_view_project_on(view, p_ws, face);
@@ -59,6 +63,7 @@ vec3 glc_view_project(GlcView view, vec3 p_ws) {
     return projected;
 }
 
+// Whether the view holds what glc_view_project returned.
 bool glc_view_inside(GlcView view, vec3 projected) {
     return projected.z > 0.0 && all(greaterThanEqual(projected.xy, vec2(0.0))) && all(lessThan(projected.xy, view.size));
 }
@@ -73,7 +78,7 @@ vec3 glc_light_direction(GlcView view, vec3 p_ws) {
     return view.light.w == 0.0 ? view.light.xyz : glc_safe_normalize(p_ws - view.light.xyz, vec3(0.0, -1.0, 0.0));
 }
 
-// Axis of the frustum or face that sees p.
+// Axis (world space, unit) of the frustum or face that sees p.
 vec3 glc_view_forward(GlcView view, vec3 p_ws) {
     if (view.faces == 1) return view.forward_ws;
     vec3 right, up, forward;

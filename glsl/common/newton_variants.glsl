@@ -11,6 +11,7 @@ struct GlcNewtonState {
     bool hit;
 };
 
+// The texel (integer coordinates) of a texture of the picture's size that the ray is over at u, kept on the picture.
 vec2 glc_newton_texel(sampler2D t, GlcRasterRay ray, float u) {
     return clamp(floor(ray.start.xy + u * ray.step.xy), vec2(0.0), vec2(textureSize(t, 0)) - 1.0);
 }
@@ -31,6 +32,7 @@ void glc_newton_advance(GlcRasterRay ray, vec2 texel, vec2 f, float next, inout 
     state.length_px = abs(solve.u - u) * max(abs(ray.step.x), abs(ray.step.y));
 }
 
+// What to call the end of the iteration: sets the status, as glc_newton does.
 void glc_newton_classify(GlcRasterRay ray, GlcNewtonState state, inout GlcSolve solve) {
     float extent = max(abs(ray.step.x), abs(ray.step.y));
     if (state.hit) solve.status = GLC_SOLVE_HIT;

@@ -35,7 +35,7 @@ bool glc_refract(vec3 d, vec3 n, float eta, out vec3 transmitted) {
     return true;
 }
 
-// Beer-Lambert transmittance over distance_m metres; sigma_a in 1/m.
+// Beer-Lambert transmittance (pbrt-v4, sec. 11.2) over distance_m metres; sigma_a in 1/m; 1 for distances below 0.
 vec3 glc_transmittance(vec3 sigma_a, float distance_m) {
     return exp(-sigma_a * max(distance_m, 0.0));
 }

@@ -1,4 +1,6 @@
 // Percentage-closer filtering over 5x5 texels in nine hardware-filtered taps (Reeves, Salesin, Cook 1987; weights of Castano 2013).
+// Pure, no uniforms. t_shadow: depth with compare and linear filter; texel: coordinates in texels of the map; depth: in [0, 1], as the
+// map stores it; lower, upper: bounds in texels that no tap may leave (a face of an atlas). Returns the lit share, in [0, 1].
 float glc_shadow_pcf(sampler2DShadow t_shadow, vec2 texel, float depth, vec2 lower, vec2 upper) {
     vec2 inverse_size = 1.0 / vec2(textureSize(t_shadow, 0));
     vec2 base = floor(texel + 0.5);

@@ -4,6 +4,8 @@
 
 // A ray's way through a solid that is known as front and back faces in a light's view (Wyman 2005; here refined by intersection,
 // and followed through total reflections). Pure functions: the maps and the box around the solids are arguments.
+// Points and directions: world space, metres; t_front, t_back: positions (rgba32f, w = 0: nothing) and t_..._normal: normals of the
+// first front and back faces that `view` sees; lengths t_max in metres.
 
 #define GLC_TIR -1
 #define GLC_NO_EXIT -4
