@@ -12,7 +12,7 @@ from glcaustics.passes.eye_medium import EyeMediumFinder
 from glcaustics.passes.frame import FrameSetup, PassContext
 from glcaustics.passes.geometry import KIND_INDEX, SPECULAR_KINDS, boxes_of
 from glcaustics.passes.lighting import sky_uniforms
-from glcaustics.passes.raster import raster_uniforms
+from glcaustics.passes.raster import raster_from_world, raster_uniforms
 from glcaustics.scene.model import OpticalKind
 
 SOLVERS: dict[str, str] = {
@@ -30,9 +30,11 @@ OUTPUTS = {
     "RADIANCE": "view.radiance",
     "CAUSTICS_VIEW": "view.caustic_irradiance",
     "STATUS": "view.solve_status",
+    "TODO": "view.todo",
     "SOLVE": "view.solve",
 }
-TODO = "view.todo_depth"
+TODO_DEPTH, REFLECTION_M = "view.todo_depth", "view.reflection_m"
+REFLECTED = {"RADIANCE": "view.radiance", "REFLECTION_M": REFLECTION_M}
 
 
 def check_solver(name: object) -> None:
@@ -46,6 +48,10 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
     solver = str(setup.options["refraction"])
     cascade = solver == "cascade"
     solids = OpticalKind.SOLID in setup.kinds()
+    stages = {
+        TODO_DEPTH: TextureDesc("depth24", setup.size),
+        REFLECTION_M: TextureDesc("r32f", setup.size, "m"),
+    }
     second: tuple[str, ...] = (
         SECOND_LAYER if int(setup.options.get("depth_layers", 1)) > 1 and solver != "sousa" else ()
     )
@@ -58,7 +64,8 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
                 "view.caustic_irradiance": TextureDesc("rgba32f", setup.size, "lux"),
                 "view.solve_status": TextureDesc("r32f", setup.size),
                 "view.solve": TextureDesc("rgba32f", setup.size),
-                **({TODO: TextureDesc("depth24", setup.size)} if cascade else {}),
+                "view.todo": TextureDesc("r8", setup.size),
+                **(stages if cascade else {}),
             },
             _execute,
             reads=(
@@ -68,7 +75,8 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
                 *(("specular.plane", "specular.back_plane", "specular.back_normal_ws") if solids else ()),
             ),
             optional=("caustics.irradiance", *second),
-            always_writes=("view.radiance", TODO) if cascade else (),
+            always_writes=("view.radiance", "view.todo", *stages) if cascade else (),
+            history=(REFLECTION_M,) if cascade else (),
             note=f"what water, glass and mirrors show; eye rays: {SOLVERS[solver]}{_eye_at_start(setup)}",
         )
     )
@@ -88,7 +96,7 @@ def _execute(ctx: PassContext) -> None:
     outputs = ctx.locations(**OUTPUTS)
     target = ctx.target(*OUTPUTS.values(), depth="specular.depth")
     with device.timer("refraction/opaque"):
-        program = device.program("passes/refraction/opaque", {**outputs, **_eye_defines(ctx)})
+        program = device.program("passes/refraction/opaque", {"HAS_REFLECTION_M": 0, **outputs, **_eye_defines(ctx)})
         program.set_all({**_textures(ctx), **_eye_uniforms(ctx)})
         device.draw_fullscreen(program, target, depth_func="<=")
     with device.timer("refraction/first"):
@@ -103,16 +111,22 @@ def _finish(ctx: PassContext, outputs: dict[str, int]) -> None:
     """What Newton left to do. A depth mask skips the other pixels before any shader runs: 1 all, 0.5 the reflection."""
     device = ctx.device
     with device.timer("refraction/mask"):
-        program = device.program("passes/refraction/todo").set(t_radiance=ctx.texture("view.radiance"))
-        device.draw_fullscreen(program, ctx.target(depth=TODO), depth_func="1", depth_write=True)
+        program = device.program("passes/refraction/todo").set(t_todo=ctx.texture("view.todo"))
+        device.draw_fullscreen(program, ctx.target(depth=TODO_DEPTH), depth_func="1", depth_write=True)
     with device.timer("refraction/marching"):
         program = _program(ctx, outputs, NEWTON=0, MARCH=_MARCH["cascade"], SOUSA=0, FINAL=1, RETRY=1)
-        target = ctx.target(*OUTPUTS.values(), depth=TODO)
+        target = ctx.target(*OUTPUTS.values(), depth=TODO_DEPTH)
         device.draw_fullscreen(program.set(u_mask_depth=0.75), target, depth_func="<=")
     with device.timer("refraction/reflection"):
-        alone = {f"HAS_{name}": 0 for name in OUTPUTS} | {"HAS_RADIANCE": 1, "LOCATION_RADIANCE": 0}
-        program = _program(ctx, alone, NEWTON=0, MARCH=_MARCH["cascade"], SOUSA=0, FINAL=1, REFLECTION=1)
-        target = ctx.target("view.radiance", depth=TODO)
+        ctx.target(REFLECTION_M).clear()
+        outputs = {f"HAS_{name}": 0 for name in OUTPUTS} | ctx.locations(**REFLECTED)
+        program = _program(ctx, outputs, NEWTON=0, MARCH=_MARCH["cascade"], SOUSA=0, FINAL=1, REFLECTION=1)
+        before = ctx.frame.history_camera or ctx.frame.camera
+        program.set(
+            t_last_reflection_m=ctx.history(REFLECTION_M),
+            u_last_raster_from_world=raster_from_world(before, ctx.setup.size),
+        )
+        target = ctx.target(*REFLECTED.values(), depth=TODO_DEPTH)
         device.draw_fullscreen(program.set(u_mask_depth=0.25), target, depth_func="<=", blend="add")
 
 
@@ -120,6 +134,8 @@ def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
     """The shader's permutation for one stage, its uniforms set."""
     kinds = ctx.setup.kinds()
     defines = {
+        "HAS_TODO": 0,
+        "HAS_REFLECTION_M": 0,
         **outputs,
         **_eye_defines(ctx),
         "FINAL": stage["FINAL"],

@@ -28,10 +28,11 @@ const float GLC_SOLVE_TOLERANCE_PX = 1.0;
 
 // t_plane: rgba32f planes. facing: 1 for surfaces that the ray enters from the eye's side, -1 for those it leaves towards it.
 // The loop holds one break and no other branch: what failed is told apart after it.
-GlcSolve glc_newton(sampler2D t_plane, GlcRasterRay ray, float facing, int max_iterations) {
+// u: where to look first.
+GlcSolve glc_newton_from(sampler2D t_plane, GlcRasterRay ray, float facing, float u, int max_iterations) {
     GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_DIVERGED, 0);
     vec2 last = vec2(textureSize(t_plane, 0)) - 1.0;
-    float u = 0.0, front = 0.0, behind = 1.0;
+    float front = 0.0, behind = 1.0;
     bool hit = false;
     for (int i = 0; i < max_iterations; ++i) {
         vec2 texel = clamp(floor(ray.start.xy + u * ray.step.xy), vec2(0.0), last);
@@ -57,4 +58,8 @@ GlcSolve glc_newton(sampler2D t_plane, GlcRasterRay ray, float facing, int max_i
     else if (u >= ray.u_screen && ray.u_screen < 1.0) solve.status = GLC_SOLVE_OFFSCREEN;
     else if ((behind - front) * extent < 1.0) solve.status = GLC_SOLVE_DISCONTINUITY;
     return solve;
+}
+
+GlcSolve glc_newton(sampler2D t_plane, GlcRasterRay ray, float facing, int max_iterations) {
+    return glc_newton_from(t_plane, ray, facing, 0.0, max_iterations);
 }

@@ -39,6 +39,11 @@ float glc_raster_distance(GlcRasterRay ray, float u) {
     return ray.length_m * u * ray.w.x / mix(ray.w.y, ray.w.x, u);
 }
 
+// u at so many metres along the ray: the inverse of that.
+float glc_raster_at(GlcRasterRay ray, float distance_m) {
+    return distance_m * ray.w.y / max(ray.length_m * ray.w.x - distance_m * (ray.w.x - ray.w.y), 1e-30);
+}
+
 // A stored plane is (g.x, g.y, c, depth_m), depth 0 where nothing is stored. x: numerator, y: denominator of u at the
 // intersection; y < 0 where the ray goes from in front of the surface (eye's side) to behind it; f(u) = u y - x is then the
 // signed gap, > 0 in front.

@@ -103,3 +103,25 @@ def test_from_under_water_snells_window_is_where_it_must_be() -> None:
     critical = np.tan(np.arcsin(1 / 1.333))
     assert (status[tangent < 0.97 * critical] == 2).all()
     assert (status[tangent > 1.03 * critical] == 4).all()
+
+
+def test_reflections_seeded_by_the_last_frame_show_what_marched_ones_show() -> None:
+    """The second frame of a still view, and one of moved waves, against frames without a past."""
+    scene = glc.load_scene("pool")
+    still = replace(scene, camera=seeded_cameras(scene, 3)[2], camera_at=None)  # grazing
+
+    def off(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
+        difference = np.abs(a.astype(np.float64) - b).max(axis=-1)
+        return float((difference > 1e-2 * b.mean()).mean()), float((a.mean() - b.mean()) / b.mean())
+
+    with glc.Renderer(still, SIZE, "none", backend=BACKEND) as made:
+        first, second, moved = (made.render(t).image for t in (0.0, 0.0, 0.05))
+        texture = made._runner.texture("view.reflection_m")  # type: ignore[union-attr]
+        metres = np.frombuffer(texture.read(), np.float32)
+    with glc.Renderer(still, SIZE, "none", backend=BACKEND) as fresh:
+        alone = fresh.render(0.05).image
+    assert np.isfinite(metres).all() and (metres >= 0.0).all() and (metres > 0.0).mean() > 0.005
+    for a, b in ((second, first), (moved, alone)):
+        changed, shift = off(a, b)
+        assert changed < 2e-3 and abs(shift) < 2e-4
+    assert off(moved, first)[0] > 0.05, "the waves have moved"

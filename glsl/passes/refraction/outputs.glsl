@@ -8,11 +8,17 @@ layout(location = LOCATION_CAUSTICS_VIEW) out vec4 o_caustics;   // E_c at the f
 #if HAS_STATUS
 layout(location = LOCATION_STATUS) out float o_status;           // GLC_VIEW_*
 #endif
+#if HAS_TODO
+layout(location = LOCATION_TODO) out float o_todo;               // GLC_TODO_*
+#endif
+#if HAS_REFLECTION_M
+layout(location = LOCATION_REFLECTION_M) out float o_reflection_m;   // metres to where the reflected ray was solved; 0: it was not
+#endif
 #if HAS_SOLVE
 layout(location = LOCATION_SOLVE) out vec4 o_solve;              // uv of the hit, error in pixels, texel look-ups
 #endif
 
-// What later stages must finish, kept in the radiance's alpha: also the mask's depth (todo.frag).
+// What later stages must finish: also the mask's depth (todo.frag).
 #define GLC_TODO_NOTHING 0.0
 #define GLC_TODO_REFLECTION 0.5
 #define GLC_TODO_ALL 1.0
@@ -40,7 +46,13 @@ struct Seen {
 
 void write_view(Seen seen, float todo) {
 #if HAS_RADIANCE
-    o_radiance = vec4(seen.radiance, todo);
+    o_radiance = vec4(seen.radiance, 1.0);
+#endif
+#if HAS_TODO
+    o_todo = todo;
+#endif
+#if HAS_REFLECTION_M
+    o_reflection_m = seen.status == GLC_VIEW_MARCHED || seen.status == GLC_VIEW_NEWTON ? seen.distance_m : 0.0;
 #endif
 #if HAS_CAUSTICS_VIEW
     o_caustics = vec4(seen.caustics, 1.0);

@@ -58,7 +58,7 @@ void main() {
         write_view(Seen(vec3(0.0), vec3(0.0), 0.0, v_uv, 0.0, 0.0, GLC_VIEW_OPAQUE), GLC_TODO_NOTHING);   // done already
         return;
 #endif
-        Seen mirror = look_along(p, reflect(v, n));
+        Seen mirror = look_along(p, reflect(v, n), u_reflection_steps);
 #if HAS_EYE_MEDIUM
         mirror.radiance *= glc_eye_transmittance(v_uv, depth_m, u_bounds_min_ws, u_bounds_max_ws) * glc_transmittance(u_eye_sigma_a, mirror.distance_m);
 #endif
@@ -82,7 +82,7 @@ void main() {
     float absorbing_m = from_dense ? length(p - u_world_from_camera[3].xyz) : 0.0;
 #if USE_MARCH && !RETRY
     {
-        Seen seen = look_along(p, reflected);
+        Seen seen = look_along(p, reflected, share > REFLECT_FROM ? u_reflection_steps : 0);
 #if HAS_EYE_MEDIUM
         seen.radiance *= glc_transmittance(u_eye_sigma_a, seen.distance_m);
 #else

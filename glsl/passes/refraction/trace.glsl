@@ -17,6 +17,10 @@ uniform sampler2D t_bounds;
 #if HAS_CAUSTICS_VIEW
 uniform sampler2D t_caustics;
 #endif
+#if REFLECTION
+uniform sampler2D t_last_reflection_m;     // of the last frame, by its own raster space
+uniform mat4 u_last_raster_from_world;
+#endif
 uniform vec3 u_bounds_min_ws;
 uniform vec3 u_bounds_max_ws;
 uniform float u_bounds_diagonal_m;
@@ -26,46 +30,51 @@ uniform int u_reflection_steps;
 
 // Points of a ray at which the cascade looks for what may stand before it.
 const int CLEAR_POINTS = 6;
+const int REFLECTION_ITERATIONS = 3;
 
 #if HAS_SECOND
 #include "passes/refraction/second.glsl"
 #endif
 
-Seen seen_at(vec2 uv, float distance_m, GlcSolve solve, float status) {
-    Seen seen = Seen(textureLod(t_radiance, uv, 0.0).rgb, vec3(0.0), distance_m, uv, solve.error_px, float(solve.iterations), status);
-#if HAS_CAUSTICS_VIEW
-    seen.caustics = textureLod(t_caustics, uv, 0.0).rgb;
-#endif
-    return seen;
-}
+// Where a ray ends, before anything is fetched there.
+struct End {
+    vec2 uv;
+    float distance_m;
+    float status;      // GLC_VIEW_*; SKY: nowhere on the picture
+};
 
-// At a solved ray's end. The radiance's alpha holds depth: where filtering would mix in another surface, the texel alone counts
-// (fetched by the final stage: before it, such a pixel is left to do).
-Seen seen_hit(GlcRasterRay ray, GlcSolve solve, float status, out bool mixes) {
+// The picture at an end. The radiance's alpha holds depth: where filtering at a hit would mix in another surface, the texel alone
+// counts (fetched by the final stage: before it, such a pixel is left to do).
+Seen seen_at(End end, vec3 d, GlcRasterRay ray, GlcSolve solve, out bool mixes) {
 #if HAS_SECOND
     mixes = false;
-    if (status == GLC_VIEW_SECOND) return seen_second(ray, solve);
+    if (end.status == GLC_VIEW_SECOND) return seen_second(ray, solve);
 #endif
-    vec3 end = ray.start + solve.u * ray.step;
-    float depth_m = ORTHOGRAPHIC == 1 ? -end.z : 1.0 / end.z;
-    vec2 uv = end.xy / u_raster_size;
-    vec4 filtered = textureLod(t_radiance, uv, 0.0);
-    mixes = abs(filtered.a - depth_m) > 0.02 * abs(depth_m);
+    float s = ray.start.z + solve.u * ray.step.z;
+    float depth_m = ORTHOGRAPHIC == 1 ? -s : 1.0 / s;
+    vec4 filtered = textureLod(t_radiance, end.uv, 0.0);
+    mixes = solve.status == GLC_SOLVE_HIT && abs(filtered.a - depth_m) > 0.02 * abs(depth_m);
 #if FINAL
     if (mixes) filtered = texelFetch(t_radiance, ivec2(solve.texel), 0);
+    if (end.status == GLC_VIEW_SKY) filtered.rgb = glc_sky_radiance(d);
 #endif
-    Seen seen = Seen(filtered.rgb, vec3(0.0), glc_raster_distance(ray, solve.u), uv, solve.error_px, float(solve.iterations), status);
+    Seen seen = Seen(filtered.rgb, vec3(0.0), end.distance_m, end.uv, solve.error_px, float(solve.iterations), end.status);
 #if HAS_CAUSTICS_VIEW
-    seen.caustics = mixes ? texelFetch(t_caustics, ivec2(solve.texel), 0).rgb : textureLod(t_caustics, uv, 0.0).rgb;
+    seen.caustics = mixes ? texelFetch(t_caustics, ivec2(solve.texel), 0).rgb : textureLod(t_caustics, end.uv, 0.0).rgb;
+    if (end.status == GLC_VIEW_SKY) seen.caustics = vec3(0.0);
 #endif
     return seen;
 }
 
+End end_of(GlcRasterRay ray, GlcSolve solve, float status) {
+    return End((ray.start.xy + solve.u * ray.step.xy) / u_raster_size, glc_raster_distance(ray, solve.u), status);
+}
+
+#if USE_NEWTON || USE_MARCH
 // The ray met nothing on the picture. Its last known surface is continued as a plane: if the ray meets that within the scene, the
 // surface is continued beyond its visible edge by its mirror image (where that is the same plane; else by its last texel), else it
 // is the sky. Continuous at the picture's border and at the rims of objects, and without streaks.
-Seen seen_beyond(GlcRasterRay ray, vec3 d, GlcSolve solve) {
-#if USE_NEWTON || USE_MARCH
+End end_beyond(GlcRasterRay ray, GlcSolve solve) {
     // Two pixels back: the rim itself is an edge-on surface as often as not.
     float back = 2.0 / max(max(abs(ray.step.x), abs(ray.step.y)), 1e-6);
     float u_last = max(min(solve.u_front, ray.u_screen) - back, 0.0);
@@ -79,21 +88,18 @@ Seen seen_beyond(GlcRasterRay ray, vec3 d, GlcSolve solve) {
         met = u_last;
         meets = true;
     }
-    if (meets) {
-        vec2 beyond = ray.start.xy + met * ray.step.xy - px;
-        // To and fro over a quarter of the picture's height, should it go on for long.
-        float reach = length(beyond), fold = 0.25 * u_raster_size.y;
-        float folded = fold - abs(mod(reach, 2.0 * fold) - fold);
-        vec2 mirrored = clamp(px - beyond * (folded / max(reach, 1e-3)), vec2(0.5), u_raster_size - 0.5);
-        vec4 other = texelFetch(t_plane, ivec2(mirrored), 0);
-        float s = plane.z + dot(plane.xy, mirrored);
-        if (other.w > 0.0 && abs(other.z + dot(other.xy, mirrored) - s) < 0.04 * abs(s)) px = mirrored;
-        float status = solve.status == GLC_SOLVE_OFFSCREEN ? GLC_VIEW_OFFSCREEN : (hidden ? GLC_VIEW_HIDDEN : GLC_VIEW_FALLBACK);
-        return seen_at(px / u_raster_size, glc_raster_distance(ray, met), solve, status);
-    }
-#endif
-    return Seen(glc_sky_radiance(d), vec3(0.0), ray.length_m, vec2(-1.0), solve.error_px, float(solve.iterations), GLC_VIEW_SKY);
+    vec2 beyond = ray.start.xy + met * ray.step.xy - px;
+    // To and fro over a quarter of the picture's height, should it go on for long.
+    float reach = length(beyond), fold = 0.25 * u_raster_size.y;
+    float folded = fold - abs(mod(reach, 2.0 * fold) - fold);
+    vec2 mirrored = clamp(px - beyond * (folded / max(reach, 1e-3)), vec2(0.5), u_raster_size - 0.5);
+    vec4 other = texelFetch(t_plane, ivec2(mirrored), 0);
+    float s = plane.z + dot(plane.xy, mirrored);
+    if (other.w > 0.0 && abs(other.z + dot(other.xy, mirrored) - s) < 0.04 * abs(s)) px = mirrored;
+    float status = solve.status == GLC_SOLVE_OFFSCREEN ? GLC_VIEW_OFFSCREEN : (hidden ? GLC_VIEW_HIDDEN : GLC_VIEW_FALLBACK);
+    return meets ? End(px / u_raster_size, glc_raster_distance(ray, met), status) : End(vec2(-1.0), ray.length_m, GLC_VIEW_SKY);
 }
+#endif
 
 GlcRasterRay eye_ray(vec3 p, vec3 d) {
     float room = glc_box_exit(p, d, u_bounds_min_ws, u_bounds_max_ws);
@@ -111,13 +117,8 @@ Seen look_sousa(GlcRasterRay ray, vec3 p, vec3 d) {
     vec2 px = clamp(q.w > 0.0 ? q.xy / q.w : ray.start.xy, vec2(0.5), u_raster_size - 0.5);
     float there = texelFetch(t_opaque_depth_m, ivec2(px), 0).r;
     if (there > 0.0 && there < start) px = clamp(ray.start.xy, vec2(0.5), u_raster_size - 0.5);
-    Seen seen = seen_at(px / u_raster_size, t, none, GLC_VIEW_FALLBACK);
-    if (there <= 0.0) {
-        seen.radiance = glc_sky_radiance(d);
-        seen.caustics = vec3(0.0);
-        seen.status = GLC_VIEW_SKY;
-    }
-    return seen;
+    bool mixes;
+    return seen_at(End(px / u_raster_size, t, there > 0.0 ? GLC_VIEW_FALLBACK : GLC_VIEW_SKY), d, ray, none, mixes);
 }
 
 #if USE_MARCH == 1
@@ -128,8 +129,8 @@ Seen look_sousa(GlcRasterRay ray, vec3 p, vec3 d) {
 
 // Along a refracted ray. solved: false where a later stage should look again.
 Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved) {
-    solved = true;
 #if USE_SOUSA
+    solved = true;
     return look_sousa(ray, p, d);
 #else
     GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_DIVERGED, 0);
@@ -151,39 +152,53 @@ Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved) {
     if (!in_view) look_behind(ray, u_refraction_steps, solve, status);
 #endif
     solved = solve.status == GLC_SOLVE_HIT;
-    vec2 uv = (ray.start.xy + solve.u * ray.step.xy) / u_raster_size;
-    Seen seen;
-    if (solved) {
-        bool mixes;
-        seen = seen_hit(ray, solve, status, mixes);
-#if !FINAL
-        solved = !mixes && glc_way_is_clear(t_bounds, u_raster_size, ray, solve, CLEAR_POINTS);
-#endif
-        return seen;
-    }
+    End end = end_of(ray, solve, solved ? status : GLC_VIEW_FALLBACK);
+    vec2 estimate = end.uv;
 #if FINAL
-    seen = seen_beyond(ray, d, solve);
-#else
-    seen = Seen(vec3(0.0), vec3(0.0), 0.0, uv, solve.error_px, float(solve.iterations), GLC_VIEW_FALLBACK);
+    if (!solved) end = end_beyond(ray, solve);
 #endif
-    seen.uv = uv;   // the solver's own estimate, for who judges it
+    bool mixes;
+    Seen seen = seen_at(end, d, ray, solve, mixes);
+#if !FINAL
+    solved = solved && !mixes && glc_way_is_clear(t_bounds, u_raster_size, ray, solve, CLEAR_POINTS);
+#endif
+    seen.uv = estimate;   // the solver's own, for who judges it
     return seen;
 #endif
 }
 
-// Along a reflected ray: marched where marching is on, else what the sky holds.
-Seen look_along(vec3 p, vec3 d) {
+#if REFLECTION
+// Newton's method from where the ray of the same point ended in the last frame. Its hit counts if the way to it is clear, too.
+GlcSolve solve_again(vec3 p, GlcRasterRay ray) {
+    vec4 q = u_last_raster_from_world * vec4(p, 1.0);
+    vec2 was = q.xy / max(q.w, 1e-20);
+    bool seen = q.w > 0.0 && all(greaterThanEqual(was, vec2(0.0))) && all(lessThan(was, u_raster_size));
+    float last_m = seen ? texelFetch(t_last_reflection_m, ivec2(was), 0).r : 0.0;
+    int iterations = last_m > 0.0 ? REFLECTION_ITERATIONS : 0;
+    GlcSolve solve = glc_newton_from(t_plane, ray, 1.0, clamp(glc_raster_at(ray, last_m), 0.0, ray.u_screen), iterations);
+    if (!glc_way_is_clear(t_bounds, u_raster_size, ray, solve, CLEAR_POINTS)) solve.status = GLC_SOLVE_DIVERGED;
+    return solve;
+}
+#endif
+
+// Along a reflected ray: marched (0 steps: not at all) where marching is on, else what the sky holds.
+Seen look_along(vec3 p, vec3 d, int steps) {
 #if USE_MARCH
     GlcRasterRay ray = eye_ray(p, d);
-    bool mixes, in_view;
-    GlcSolve solve = MARCH(ray, u_reflection_steps, in_view);
     float status = GLC_VIEW_MARCHED;
-#if HAS_SECOND
-    if (!in_view) look_behind(ray, u_reflection_steps, solve, status);
+    bool mixes, in_view = true;
+#if REFLECTION
+    GlcSolve solve = solve_again(p, ray);
+    if (solve.status != GLC_SOLVE_HIT) solve = MARCH(ray, steps, in_view);
+#else
+    GlcSolve solve = MARCH(ray, steps, in_view);
 #endif
-    if (solve.status == GLC_SOLVE_HIT)
-        return seen_hit(ray, solve, status, mixes);
-    return seen_beyond(ray, d, solve);
+#if HAS_SECOND
+    if (!in_view) look_behind(ray, steps, solve, status);
+#endif
+    End end = end_of(ray, solve, status);
+    if (solve.status != GLC_SOLVE_HIT) end = end_beyond(ray, solve);
+    return seen_at(end, d, ray, solve, mixes);
 #else
     return Seen(glc_sky_radiance(d), vec3(0.0), 0.0, vec2(-1.0), 0.0, 0.0, GLC_VIEW_SKY);
 #endif
