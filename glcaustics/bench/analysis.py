@@ -14,6 +14,7 @@ ERROR_RATIO, ERROR_FLOOR = 1.15, 0.003  # noise of random methods and of the ref
 # Growth of a frame's time over the run without caustics, which takes the machine's speed out. A single row on a busy
 # machine is off by a factor of two now and then; the median over a method's rows is not.
 TIME_RATIO, TIME_RATIO_MEDIAN = 3.0, 1.4
+SOLVE, BASE = "refraction/first", "sousa"  # the stage that solves, and the solver that only estimates
 
 
 def fit_power(x: Sequence[float], y: Sequence[float]) -> dict[str, float] | None:
@@ -55,6 +56,12 @@ def cost_at_error(rows: Sequence[Row], error: float) -> float | None:
             share = math.log(e0 / error) / math.log(e0 / e1)
             return float(t0 * (t1 / t0) ** share)
     return None
+
+
+def solve_cost(costs: Mapping[str, Mapping[str, float]], solver: str) -> float | None:
+    """Fetch passes of a solver's solve alone: its first stage less that of Sousa's estimate, which shades the same."""
+    first, base = (costs.get(name, {}).get(SOLVE) for name in (solver, BASE))
+    return None if first is None or base is None else max(first - base, 0.0)
 
 
 def row_id(row: Row) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from glcaustics.bench.analysis import solve_cost
 from glcaustics.bench.equal_error import PTRACER, best_of, ratio_text
 
 Report = Mapping[str, Any]
@@ -139,3 +140,8 @@ def _eye_cost(costs: list[Any], water: Mapping[str, list[float]]) -> Iterator[Ma
             cost = max(one["with_reflections"]["cascade"]["total"] for one in full)
             what = f"{name}: fetch passes of a view full of water"
             yield _mark(what, f"<= {WATER_COST:.0f}", f"{cost:.1f}", cost <= WATER_COST, at)
+        solves = [(solve_cost(one["without"], "newton"), solve_cost(one["without"], "dda")) for one in mine]
+        ratios = [newton / dda for newton, dda in solves if newton is not None and dda]
+        if ratios:
+            what = f"{name}: Newton's solve alone over dda's"
+            yield _mark(what, f"<= {NEWTON_COST:.2f}", f"{max(ratios):.2f}", max(ratios) <= NEWTON_COST, at)

@@ -24,6 +24,7 @@ STAGES = {  # of the paper's table, by the passes' names; a pass belongs to the 
     "denoising": ("svgf.",),
     "buffers": ("caster_view", "caster_back", "receiver_view", "depth_chain"),
 }
+REFLECTED = "photon_trace.trace.reflect"  # of the tracing, what reflected photons take: these march the longest
 MARCHES = ("hierarchical", "dda")
 
 
@@ -139,12 +140,13 @@ def _renderer(scene: Scene, size: tuple[int, int], options: Mapping[str, Any], b
 
 
 def stages_of(timings: Mapping[str, float]) -> dict[str, float]:
-    """Sum of the passes' times by stage; passes of passes ("a/b") are in their parent already."""
-    found = dict.fromkeys(STAGES, 0.0)
+    """Sum of the passes' times by stage, and `reflected` of the tracing; passes of passes ("a/b") are in their parent already."""
+    found = dict.fromkeys((*STAGES, "reflected"), 0.0)
     for name, ms in timings.items():
         stage = next((stage for stage, prefixes in STAGES.items() if name.startswith(prefixes)), None)
         if stage is not None and "/" not in name:
             found[stage] += ms
+            found["reflected"] += ms if name.startswith(REFLECTED) else 0.0
     return found
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from glcaustics.bench.analysis import solve_cost
 from glcaustics.bench.equal_error import DENOISED, PTRACER, ratio_text
 
 Report = Mapping[str, Any]
@@ -132,18 +133,29 @@ def _equal_time_table(one: Mapping[str, Any]) -> Table:
 
 def _stage_table(one: Mapping[str, Any]) -> Table:
     rows = []
-    dda = {r["photons"]: r["ms"]["tracing"] for r in one["stages"] if r["march"] == "dda"}
+    dda = {r["photons"]: r["ms"] for r in one["stages"] if r["march"] == "dda"}
     for r in one["stages"]:
         ms = r["ms"]
         three = sum(ms[name] for name in ("tracing", "storing", "denoising"))
         shares = [f"{ms[name]:.0f} ({ms[name] / three:.0%})" for name in ("tracing", "storing", "denoising")]
         ours = r["march"] != "dda"
         hits = r["same_hits"]["share"] if ours else None
-        ratio = f"{ms['tracing'] / dda[r['photons']]:.2f}" if ours else ""
+        ratio = ""
+        if ours:
+            whole, reflected = (ms[name] / dda[r["photons"]][name] for name in ("tracing", "reflected"))
+            ratio = f"{whole:.2f} ({reflected:.2f})"
         cells = [f"{r['photons']} {r['march']}", *shares, f"{ms['buffers']:.0f}"]
         rows.append([*cells, ratio, "" if hits is None else f"{hits:.2%}"])
     first = one["stages"][0]
-    head = ("photons", "tracing", "storing", "denoising", "views it needs", "tracing of dda's", "same hits")
+    head = (
+        "photons",
+        "tracing",
+        "storing",
+        "denoising",
+        "views it needs",
+        "tracing of dda's (reflected photons')",
+        "same hits",
+    )
     width, height = first["size"]
     views = f"light views {first['view_size']}^2"
     note = f"{width}x{height}, {views}; ms by {first['clock']}; median of {first['frames']} frames"
@@ -204,17 +216,22 @@ def _convergence_table(found: Sequence[Any], name: str, share: str, views: str, 
 
 
 def _cost_table(costs: Sequence[Any]) -> Table:
-    solvers = list(costs[0]["with_reflections"])
-    rows = []
+    solvers, rows = list(costs[0]["with_reflections"]), []
     for one in costs:
-        dda = one["without"].get("dda", {}).get("total")
+        plain = one["without"]
         cells = [f"{one['scene']}, view {one['view']}"]
-        cells += [f"{one['with_reflections'][s]['total']:.1f} / {one['without'][s]['total']:.1f}" for s in solvers]
-        ratio = f"{one['without']['cascade']['total'] / dda:.2f}" if dda else ""
-        rows.append([*cells, ratio])
+        cells += [f"{one['with_reflections'][s]['total']:.1f} / {plain[s]['total']:.1f}" for s in solvers]
+        solves = [solve_cost(plain, name) for name in ("newton", "dda")]
+        cells.append(f"{plain['cascade']['total'] / plain['dda']['total']:.2f}")
+        cells.append("" if None in solves else " / ".join(f"{cost:.1f}" for cost in solves))
+        rows.append(cells)
     width, height = costs[0]["size"]
-    note = f"{width}x{height}; whole pass with / without reflections; unit: one full-screen fetch of rgba32f"
-    return Table("Cost of eye rays in fetch passes", ("scene", *solvers, "cascade of dda's"), rows, note)
+    note = (
+        f"{width}x{height}; whole passes with / without reflections; unit: one full-screen fetch of rgba32f; a solve "
+        "alone: the solver's first stage less Sousa's, which estimates"
+    )
+    head = ("scene", *solvers, "cascade of dda's", "solve of newton / dda")
+    return Table("Cost of eye rays in fetch passes", head, rows, note)
 
 
 # ---------------------------------------------------------------- through water; marks

@@ -80,14 +80,20 @@ def test_stages_and_hits_of_both_marches() -> None:
     rows = stage_table(room(), SIZE, [3000], 64, 1, BACKEND)
     assert [row["march"] for row in rows] == list(MARCHES)
     for row in rows:
-        assert set(row["ms"]) == set(STAGES) and all(row["ms"].values())
+        assert set(row["ms"]) == {*STAGES, "reflected"} and all(row["ms"].values())
     assert rows[0]["same_hits"]["photons"] > 1000 and rows[0]["same_hits"]["share"] > 0.98
 
 
 def test_stages_are_told_by_name() -> None:
-    timings = {"photon_trace.trace@0": 3.0, "photon_trace.scatter": 2.0, "svgf.atrous_0": 1.0, "svgf.atrous_0/x": 9.0}
+    timings = {
+        "photon_trace.trace.interface@0": 3.0,
+        "photon_trace.trace.reflect@0": 5.0,
+        "photon_trace.scatter": 2.0,
+        "svgf.atrous_0": 1.0,
+        "svgf.atrous_0/x": 9.0,
+    }
     found = stages_of(timings | {"depth_chain.4": 4.0, "shade": 7.0})
-    assert found == {"tracing": 3.0, "storing": 2.0, "denoising": 1.0, "buffers": 4.0}
+    assert found == {"tracing": 8.0, "storing": 2.0, "denoising": 1.0, "buffers": 4.0, "reflected": 5.0}
 
 
 def test_hits_are_the_same_within_one_pixel() -> None:

@@ -168,3 +168,42 @@ def test_a_scene_without_a_target_is_refused(tmp_path: Path) -> None:
 
     with pytest.raises(UsageError, match="has no target"):
         Study(replace(QUICK, scenes=("dry-room",)), tmp_path)
+
+
+def test_the_page_shows_the_parts_that_were_measured() -> None:
+    """Without any target measured: pictures and maps of the flooded box, rays, the mesh, all as data URIs."""
+    ms = {"tracing": 3.0, "storing": 1.0, "denoising": 5.0, "buffers": 2.0, "reflected": 2.0}
+    stage = {"photons": 9, "size": [4, 4], "view_size": 4, "clock": "a clock", "frames": 1, "ms": ms}
+    errors = {"frames": 2, "rrmse": 0.05, "rrmse_plain": 0.04, "bias": 0.0}
+    photons = {
+        "scene": "box",
+        "settings": {"side": 8, "filtered": 8, "frames": 2, "view_size": 4},
+        "reference": {"source": "beams", "noise": 0.01},
+        "static": [{"photons": 9, "series": [errors], "frame_ms": 1.0, "processor_ms": 1.0, **errors}],
+        "final": [{"photons": 9, "flip": 0.01}],
+        "stages": [stage | {"march": "hierarchical", "same_hits": {"share": 1.0}}, stage | {"march": "dda"}],
+    }
+    pooled = {"iterations": [0, 1], "within_1px": [0.5, 1.0], "wrong": [0.0, 0.0], "cascade": 1.0, "hierarchical": 1.0}
+    rays = [{"scene": "pool", "pooled": pooled, "views": []}]
+    eye = {
+        "settings": {"scenes": ["pool"], "views": 1, "size": [8, 8]},
+        "eye_rays": rays,
+        "light_rays": [],
+        "costs": [],
+    }
+    mesh = {"strength": 1.0, "mesh": 128, "map": 512, "rrmse": 0.03, "mae": 0.01, "bias": 0.0}
+    report = document() | {"rows": [], "scaling": [], "validation": [], "photons": [photons], "eye": eye}
+    report |= {"mesh": {"rows": [mesh], "noise": {"s=1": 0.001}, "orders": [], "pixels": 8}}
+    report |= {"marks": [{"what": "<what>", "mark": "1", "measured": "2", "met": False, "at": "8^2"}]}
+    maps = {name: np.full((8, 8), 1.0) for name in ("box view reference", "box view 9")}
+    shown = ("box with the reference", "box 9 photons", "pool view")
+    text = page(report, maps, {"rays-pool.png": b"PNG"}, {name: np.zeros((8, 8, 3), np.uint8) for name in shown})
+    assert not re.findall(r"(?:src|href)=\"(?!data:)", text)
+    assert text.count("<img") == 3 + 3 + 2, "pictures and their difference; maps and their error; a view and its curve"
+    assert '<span class="bad">NOT met</span>' in text and "&lt;what&gt;" in text
+    for words in (
+        "The displaced mesh against beams",
+        "box: milliseconds and shares",
+        "Newton&#x27;s share of eye rays",
+    ):
+        assert words in text

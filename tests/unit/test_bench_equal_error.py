@@ -87,7 +87,7 @@ def test_marks_are_judged_and_listed() -> None:
 
 def photons(rrmse: float, flip: float, share: float, tracing_ms: float) -> dict[str, Any]:
     """A report's entry for a flooded scene."""
-    ms = {"tracing": tracing_ms, "storing": 1.0, "denoising": 5.0, "buffers": 2.0}
+    ms = {"tracing": tracing_ms, "storing": 1.0, "denoising": 5.0, "buffers": 2.0, "reflected": 2.0}
     stage = {"photons": 1000, "size": [64, 48], "view_size": 32, "clock": "processor time", "frames": 2}
     series = [{"frames": 16, "rrmse": rrmse, "rrmse_plain": rrmse, "bias": 0.0}]
     settings = {"side": 64, "filtered": 32, "frames": 16, "view_size": 32}
