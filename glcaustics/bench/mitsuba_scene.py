@@ -2,7 +2,9 @@
 
 What differs on purpose: textures of diffuse surfaces become their mean colour (irradiance does not depend on them);
 metals get, at each vertex, the reflectance that glTF's Schlick formula has there for one light, since Mitsuba has no
-such BSDF; light is aimed at the casters, so that no photon is wasted on what is not asked for.
+such BSDF (rough ones too: the reflectance at the vertex's own normal, not at each microfacet's); light is aimed at the
+casters, so that no photon is wasted on what is not asked for. A lamp with a radius is exact, a glowing sphere, and
+shines everywhere; the sun's disc is a sum of directional lights on the whole scene.
 """
 
 from __future__ import annotations
@@ -16,9 +18,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from glcaustics.bench.scene_export import world_normals
+from glcaustics.bench.scene_export import beam_light, world_normals
 from glcaustics.bench.targets import SPECULAR, luminance
 from glcaustics.errors import UsageError
+from glcaustics.optics.beam_spread import disc_parts
 from glcaustics.scene.model import Camera, Instance, Light, LightKind, OpticalKind, Scene
 
 FloatArray = npt.NDArray[np.float64]
@@ -109,21 +112,28 @@ def schlick_at_vertices(instance: Instance, light: Light) -> FloatArray:
     return np.asarray(f0 + (1.0 - f0) * ((1.0 - cosine) ** 5)[:, None])
 
 
-def bsdf_of(mi: Any, instance: Instance, albedo: float | None = None) -> Any:
-    """The BSDF of an instance; `albedo` replaces the colour of a diffuse one."""
+def bsdf_of(mi: Any, instance: Instance, albedo: float | None = None, *, rough: bool = False) -> Any:
+    """The BSDF of an instance; `albedo` replaces the colour of a diffuse one; `rough`: specular ones as rough as they
+    are (GGX of width roughness^2, separable masking), else smooth.
+    """
     material, kind = instance.material, instance.optical_kind
+    facets: dict[str, Any] = {}
+    if rough and material.roughness > 0.0:
+        facets = {"distribution": "ggx", "alpha": float(material.roughness) ** 2}
     if kind in (OpticalKind.SOLID, OpticalKind.INTERFACE):
         return mi.load_dict(
             {
-                "type": "dielectric",
+                "type": "roughdielectric" if facets else "dielectric",
                 "int_ior": float(material.ior),
                 "ext_ior": 1.0,
                 "specular_transmittance": float(material.transmission),
+                **facets,
             }
         )
     if kind is OpticalKind.MIRROR:
         attribute = {"type": "mesh_attribute", "name": "vertex_reflectance"}
-        metal = {"type": "conductor", "material": "none", "specular_reflectance": attribute}
+        name = "roughconductor" if facets else "conductor"
+        metal = {"type": name, "material": "none", "specular_reflectance": attribute, **facets}
         return mi.load_dict({"type": "twosided", "bsdf": metal})
     color = np.asarray(material.base_color) * _mean_texture(instance)
     reflectance = albedo if albedo is not None else spectrum(mi, np.clip(color, 0.0, 1.0))
@@ -168,8 +178,43 @@ def look(
     return transform.scale(np.asarray(scale, np.float64).tolist())
 
 
+DISC_POINTS = 128  # collimated lights that stand for a disc in the sky
+
+
+def aimed_lights(mi: Any, light: Light, aim_at_ws: FloatArray, scene_ws: FloatArray) -> dict[str, Any]:
+    """The emitters of one light, with its size, by unique names; see `aimed_light`.
+
+    Raises:
+        UsageError: a spot light with a radius, which Mitsuba does not have.
+    """
+    if not light.has_size:
+        return {"light": aimed_light(mi, light, aim_at_ws, scene_ws)}
+    if light.kind is LightKind.SPOT:
+        raise UsageError(
+            f"spot light '{light.name}' has a radius", where="Mitsuba", remedy="set it to 0 or make it a point light"
+        )
+    power = light.intensity * np.asarray(light.color, np.float64)
+    if light.kind is LightKind.DIRECTIONAL:
+        return {  # not rectangles as for one direction: they would stand in one another's light
+            f"light{k}": {
+                "type": "directional",
+                "direction": [float(x) for x in part.direction_ws],
+                "irradiance": spectrum(mi, part.intensity_rgb),
+            }
+            for k, part in enumerate(disc_parts(beam_light(light, DISC_POINTS), seed=0))
+        }
+    sphere = {
+        "type": "sphere",
+        "center": [float(x) for x in light.position_ws],
+        "radius": float(light.radius_m),
+        "bsdf": {"type": "diffuse", "reflectance": 0.0},
+        "emitter": {"type": "area", "radiance": spectrum(mi, power / (math.pi * light.radius_m**2))},
+    }
+    return {"light": sphere}
+
+
 def aimed_light(mi: Any, light: Light, aim_at_ws: FloatArray, scene_ws: FloatArray) -> dict[str, Any]:
-    """A light of the same units that shines on the points `aim_at_ws` (P, 3) and as little as possible elsewhere.
+    """A light of the same units, without its size, that shines on the points `aim_at_ws` (P, 3) and little elsewhere.
 
     A directional light becomes a rectangle outside the scene (`scene_ws`, (Q, 3)) that emits along its normal alone.
     """
@@ -254,8 +299,8 @@ def film(mi: Any, size: tuple[int, int]) -> dict[str, Any]:
     }
 
 
-def shapes(mi: Any, scene: Scene, light: Light, *, albedo: float | None = None) -> dict[str, Any]:
-    """Every instance at time 0, under unique names. `albedo`: of all diffuse surfaces."""
+def shapes(mi: Any, scene: Scene, light: Light, *, albedo: float | None = None, rough: bool = False) -> dict[str, Any]:
+    """Every instance at time 0, under unique names. `albedo`: of all diffuse surfaces. `rough`: see `bsdf_of`."""
     made = {}
     for index, instance in enumerate(scene.instances_at(0.0)):
         specular = instance.optical_kind in SPECULAR
@@ -264,5 +309,7 @@ def shapes(mi: Any, scene: Scene, light: Light, *, albedo: float | None = None) 
             reflectance = schlick_at_vertices(instance, light)
             if is_mono(mi):  # the luminance of coloured light on coloured metal is no product of luminances
                 reflectance = luminance(reflectance * light.color)[:, None] / luminance(light.color)
-        made[f"shape{index}"] = mesh(mi, instance, bsdf_of(mi, instance, None if specular else albedo), reflectance)
+        made[f"shape{index}"] = mesh(
+            mi, instance, bsdf_of(mi, instance, None if specular else albedo, rough=rough), reflectance
+        )
     return made

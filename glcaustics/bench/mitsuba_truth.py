@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from glcaustics.bench.mitsuba_scene import aimed_light, best_variant, film, look, mitsuba, shapes
+from glcaustics.bench.mitsuba_scene import aimed_lights, best_variant, film, look, mitsuba, shapes
 from glcaustics.bench.scene_export import beam_scene
 from glcaustics.bench.store import Store, digest, scene_key
 from glcaustics.bench.targets import Target, casters, luminance
@@ -82,7 +82,7 @@ class Ptracer:
 
     Args:
         scene: as Mitsuba gets it. sensor: makes its camera. film: pixels (height, width). interfaces: light's most.
-        variant: of Mitsuba; the fastest there is when None.
+        variant: of Mitsuba; the fastest there is when None. rough: specular surfaces as rough as they are.
 
     Raises:
         UsageError: Mitsuba is missing.
@@ -95,6 +95,8 @@ class Ptracer:
         film: tuple[int, int],
         interfaces: int,
         variant: str | None = None,
+        *,
+        rough: bool = False,
     ) -> None:
         self.variant = variant or best_variant()
         self._mi = mi = mitsuba(self.variant)
@@ -105,8 +107,8 @@ class Ptracer:
         for light in scene.lights:
             if not light.shines:
                 continue
-            parts = shapes(mi, scene, light, albedo=ALBEDO)
-            parts |= {"type": "scene", "light": aimed_light(mi, light, aim, everything), "sensor": sensor(mi)}
+            parts = shapes(mi, scene, light, albedo=ALBEDO, rough=rough)
+            parts |= {"type": "scene", **aimed_lights(mi, light, aim, everything), "sensor": sensor(mi)}
             self._scenes.append(mi.load_dict(parts))
         self._depth = interfaces + 2
         self.seconds = 0.0  # spent on passes of the full depth since somebody set this to 0
@@ -162,12 +164,14 @@ class PhotonMap(Ptracer):
         UsageError: Mitsuba is missing, or the target's pinhole does not see all of it.
     """
 
-    def __init__(self, scene: Scene, target: Target, pixels: int, variant: str | None = None) -> None:
+    def __init__(
+        self, scene: Scene, target: Target, pixels: int, variant: str | None = None, *, rough: bool = False
+    ) -> None:
         check_pinhole(scene, target)
         scene, target = enlarged(scene, target, HALF_M / target.half_m)
         hole = self._hole = Pinhole.over(target, pixels)
         self._pixels = pixels
-        super().__init__(scene, hole.sensor, (hole.side, hole.side), target.interfaces, variant)
+        super().__init__(scene, hole.sensor, (hole.side, hole.side), target.interfaces, variant, rough=rough)
 
     def _wanted(self, image: FloatArray) -> FloatArray:
         hole = self._hole
@@ -195,7 +199,12 @@ def larger_scene(scene: Scene, factor: float, centre_ws: FloatArray) -> tuple[Sc
     lights = tuple(
         light
         if light.kind is LightKind.DIRECTIONAL
-        else replace(light, position_ws=_moved(move, light.position_ws), intensity=light.intensity * factor**2)
+        else replace(
+            light,
+            position_ws=_moved(move, light.position_ws),
+            intensity=light.intensity * factor**2,
+            radius_m=light.radius_m * factor,
+        )
         for light in scene.lights
     )
     return replace(scene, instances=instances, waters=(), lights=lights), move

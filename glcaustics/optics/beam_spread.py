@@ -99,6 +99,13 @@ def _parts(light: BeamLight, specular_ws: FloatArray, generator: np.random.Gener
     return _sphere(light, specular_ws, generator)
 
 
+def disc_parts(light: BeamLight, seed: int) -> list[BeamLight]:
+    """The directional lights that stand for one with a disc; the light itself if it has none."""
+    if not isinstance(light, SizedBeamLight) or light.angular_radius_rad == 0.0 or light.position_ws is not None:
+        return [light]
+    return _disc(light, np.random.default_rng((seed, 77)))
+
+
 def _disc(light: SizedBeamLight, generator: np.random.Generator) -> list[BeamLight]:
     """Even over the disc as projected on a plane across its axis, so that each part's share of the irradiance there is
     the same; a part's own irradiance is that over the cosine.
