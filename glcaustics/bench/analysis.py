@@ -1,4 +1,4 @@
-"""What rows say together: scaling exponents, Pareto front, regressions against a stored report, the README's table."""
+"""What rows say together: scaling exponents, Pareto front, regressions against a stored report."""
 
 from __future__ import annotations
 
@@ -123,62 +123,3 @@ def _error_regression(old: Row, row: Row) -> list[str]:
     if was is None or now is None or now <= ERROR_RATIO * was + ERROR_FLOOR:
         return []
     return [f"{row_id(row)}: relative RMSE {now:.4f}, was {was:.4f} (allowed {ERROR_RATIO * was + ERROR_FLOOR:.4f})"]
-
-
-def table(report: Mapping[str, Any]) -> str:
-    """Markdown for the README: per scene and quality the error, the times, and what the peers need for that error."""
-    rows = [r for r in report["rows"] if not r.get("overrides")]
-    pixels = max(r["pixels"] for r in rows)
-    rows = [r for r in rows if r["pixels"] == pixels]
-    names = [
-        "scene",
-        "method",
-        "quality",
-        "relative RMSE",
-        "without foci",
-        "FLIP",
-        "bias",
-        "frame ms",
-        "of it caustics",
-    ]
-    head = " | ".join(["", *names, "ptracer, same error", "ptracer + OIDN", ""]).strip()
-    lines = [head, "|" + "---|" * 11]
-    for row in rows:
-        if row["tool"] != "glcaustics" or row["method"] == "none":
-            continue
-        e = row["errors"]
-        own = caustics_ms(rows, row)
-        peers = [_peer_cell(rows, row, method) for method in ("ptracer", "ptracer+oidn")]
-        cells = [row["scene"], row["method"], row["quality"]]
-        cells += [_number(e.get(name), ".4f") for name in ("rrmse", "rrmse_regular", "flip")]
-        cells += [_number(e.get("bias"), "+.2%")]
-        cells += [f"{row['time_ms']['median']:.0f}", _number(own, ".0f"), *peers]
-        lines.append("| " + " | ".join(cells) + " |")
-    state = report["machine"]
-    commit = str(report["commit"] or "no checkout")[:10] + (" with changes" if report["dirty"] else "")
-    clock = next(r["time_ms"]["clock"] for r in rows if r["tool"] == "glcaustics")
-    lines += [
-        "",
-        f"Irradiance at {pixels}x{pixels} of each scene's target; {state['gl_renderer']} by {clock}, {state['cpu']}, "
-        f"{state['cores']} cores; commit {commit}; `{report['command']}`.",
-    ]
-    return "\n".join(lines)
-
-
-def _number(value: float | None, form: str) -> str:
-    return "" if value is None else format(value, form)
-
-
-def _peer_cell(rows: Sequence[Row], row: Row, method: str) -> str:
-    error = row["errors"].get("rrmse")
-    mine = [r for r in rows if r["scene"] == row["scene"] and r["tool"] == "mitsuba" and r["method"] == method]
-    if error is None or not mine:
-        return ""
-    cost = cost_at_error(mine, error)
-    if cost is not None:
-        return f"{cost / 1e3:.2g} s"
-    best = min(mine, key=lambda r: r["errors"]["rrmse"])
-    least = best["errors"]["rrmse"]
-    if least > error:
-        return f"> {best['time_ms']['median'] / 1e3:.2g} s (then {least:.3f})"
-    return f"< {min(r['time_ms']['median'] for r in mine) / 1e3:.2g} s"

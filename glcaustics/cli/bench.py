@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def bench_command(args: argparse.Namespace) -> int:
     """Measures, compares or prints. Exit code 1: `--check` found a regression."""
     if args.table is not None:
-        from glcaustics.bench.analysis import table
+        from glcaustics.bench.readme import table
 
         print(table(read_report(args.table)))
         return 0
@@ -66,7 +66,8 @@ def _measure(args: argparse.Namespace) -> dict[str, Any]:
         write_bytes(folder / "plots" / name, png)
     write_text(folder / "report.html", page(report, study.images, drawn, study.pictures))
     write_text(folder / "report.json", json.dumps(report, indent=1, allow_nan=False) + "\n")
-    for v in report["validation"]:
+    flooded = [one["validation"] | {"scene": one["scene"]} for one in report.get("photons", []) if one["validation"]]
+    for v in (*report["validation"], *flooded):
         if not v["agree"]:
             text = (
                 f"{v['scene']}: beams and Mitsuba differ by {v['ratio']:.2f} times their noise, bias {v['bias']:+.2%}"

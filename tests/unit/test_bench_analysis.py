@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glcaustics.bench.analysis import caustics_ms, cost_at_error, fit_power, pareto, regressions, table
+from glcaustics.bench.analysis import caustics_ms, cost_at_error, fit_power, pareto, regressions
 from glcaustics.bench.measure import errors, reduced, regular
 from glcaustics.bench.mitsuba_truth import Halves, agreement
+from glcaustics.bench.readme import table
+from glcaustics.errors import UsageError
 
 
 def row(method: str, ms: float, rrmse: float | None = None, **more: Any) -> dict[str, Any]:
@@ -97,19 +99,28 @@ def test_rows_of_other_sizes_and_peers_are_not_compared() -> None:
     assert regressions(old, new) == ([], 0)
 
 
+def peer(ms: float, rrmse: float, photons: int, method: str = "ptracer") -> dict[str, Any]:
+    return row(method, ms, rrmse, tool="mitsuba", photons=photons)
+
+
 def test_table_has_a_line_per_row_and_says_where_it_is_from() -> None:
-    peers = [row("ptracer", 100.0, 0.5, tool="mitsuba"), row("ptracer", 10000.0, 0.05, tool="mitsuba")]
+    peers = [peer(100.0, 0.5, 1000), peer(10000.0, 0.05, 100000)]
     text = table(report(row("none", 4.0), row("caustic_map", 10.0, 0.1), *peers))
     lines = text.splitlines()
-    assert lines[2].startswith("| pool | caustic_map | low | 0.1000 |") and "| 10 | 6 | 2.5 s |" in lines[2]
+    assert lines[2].startswith("| pool | caustic_map | low | 0.1000 |") and "| 10 | 6 | 250 x |" in lines[2]
     assert len({line.count("|") for line in lines[:3]}) == 1
     assert "llvmpipe" in text and "0123456789" in text
 
 
-def test_table_names_what_peers_cannot_reach() -> None:
-    peer = row("ptracer", 2000.0, 0.5, tool="mitsuba")
-    assert "> 2 s (then 0.500)" in table(report(row("caustic_map", 10.0, 0.1), peer))
-    assert "< 2 s" in table(report(row("caustic_map", 10.0, 0.7), peer))
+def test_table_says_what_is_extrapolated_or_not_reached() -> None:
+    peers = [peer(100.0, 0.5, 1000), peer(10000.0, 0.05, 100000), peer(2000.0, 0.2, 1000, "ptracer+oidn")]
+    text = table(report(row("caustic_map", 10.0, 0.01), *peers))
+    assert "| 25000 x (extr.) | > 200 x (then 0.2) |" in text
+
+
+def test_table_without_targets_is_refused() -> None:
+    with pytest.raises(UsageError, match="no measurement"):
+        table(report())
 
 
 # ---------------------------------------------------------------- references
