@@ -1,47 +1,33 @@
 """Cascaded image-space photon tracing (Meenrattanakorn, Lambers 2022): photons go from what the light sees of specular
 surfaces through the light's view, then through the camera's, and are added up as irradiance at the camera's pixels.
 
-Beyond the paper: photons are stratified and carry the exact flux of their stratum; ends are exact on tangent planes;
-hierarchical marching; irradiance over the receiver's own area, so that energy holds on slanted receivers; refraction
-and reflection weighted by Fresnel's equations instead of by chance (which is an option); solids, dispersion and
-absorption; every loss counted.
+Beyond the paper: photons are stratified, carry the exact flux of their stratum, and start where the last frames' showed
+in the picture; ends are exact on tangent planes; hierarchical marching in both views; irradiance over the receiver's
+own area, so that energy holds on slanted receivers; refraction and reflection weighted by Fresnel's equations instead
+of by chance (which is an option); solids, dispersion and absorption; every loss counted.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 
-from glcaustics.caustics.branches import BRANCH_CODE, REFLECT, SOLID, Branch, branches_of, read_rgba32f
+from glcaustics.caustics import photon_options, photon_strata
+from glcaustics.caustics.branches import BRANCH_CODE, REFLECT, SOLID, Branch, branches_of
 from glcaustics.caustics.method import IRRADIANCE, NOISY_IRRADIANCE, CausticsMethod
-from glcaustics.errors import UsageError
+from glcaustics.caustics.photon_stats import landing_of, photon_statistics
+from glcaustics.caustics.photon_strata import photon_grid, sequence
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes import depth_chain, light_view
 from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext
-from glcaustics.passes.light_views import LightView, light_uniforms
+from glcaustics.passes.light_views import light_uniforms
 from glcaustics.passes.raster import raster_uniforms
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.scene.model import Instance, OpticalKind
 
 SHADERS = "caustics/photon_trace"
-LANDED = {1: "by_light_view", 2: "by_eye_view"}
-UNSEEN = {-9: "hidden_from_the_eye", -10: "outside_of_the_picture"}  # landed, but not where the picture shows it
-LEFT = -8
-LOST = {
-    -1: "total_internal_reflection",
-    -2: "hidden_from_the_light_and_the_eye",
-    -3: "unresolved",
-    -4: "no_exit_found",
-    -5: "absorbed",
-    -6: "normal_faces_away",
-    -7: "met_another_specular_surface",
-    -11: "scattered_between_facets",
-}
-CHOICES = {"fresnel": ("split", "chance"), "march": ("hierarchical", "dda")}
-GOLDEN_3D = 1.2207440846057596  # root of x^4 = x + 1: the R3 sequence (Roberts 2018)
 
 
 class PhotonTrace(CausticsMethod):
@@ -56,79 +42,16 @@ class PhotonTrace(CausticsMethod):
     noise_share = 0.4
     follows_size_and_roughness = True
     unbiased_options: ClassVar[Mapping[str, Any]] = {"denoise": False}
-    ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        quality: {
-            "photons": photons,
-            "caster_size": caster,
-            "map_size": receiver,
-            "max_iterations": iterations,
-            "march_steps": steps,
-            "view_steps": view_steps,
-            "internal_bounces": bounces,
-            "denoise_passes": passes,
-        }
-        for quality, photons, caster, receiver, iterations, steps, view_steps, bounces, passes in (
-            ("draft", 1 << 16, 192, 256, 6, 16, 64, 0, 4),
-            ("low", 1 << 18, 384, 512, 8, 24, 96, 1, 4),
-            ("medium", 1 << 19, 768, 768, 10, 32, 160, 2, 5),
-            ("high", 1 << 20, 1024, 1024, 12, 48, 256, 4, 5),
-            ("reference", 1 << 22, 2048, 2048, 16, 96, 1024, 8, 5),
-        )
-    }
-    ranges: ClassVar[Mapping[str, tuple[int, int]]] = {
-        "photons": (64, 1 << 24),
-        "caster_size": (8, 8192),
-        "map_size": (8, 8192),
-        "max_iterations": (1, 64),
-        "march_steps": (1, 512),
-        "view_steps": (8, 16384),
-        "internal_bounces": (0, 32),
-        "denoise_passes": (1, 8),
-        "history_frames": (1, 1024),
-    }
-    flags: ClassVar[tuple[str, ...]] = ("reflect", "dispersion", "denoise")
-    option_help: ClassVar[Mapping[str, str]] = {
-        "photons": "about this many start a frame, a light and kind of path (64..16777216)",
-        "caster_size": "the casters' light view has about this^2 texels (8..8192)",
-        "map_size": "the receivers' light view has about this^2 texels (8..8192)",
-        "max_iterations": "of the intersection estimate in the light's view (1..64)",
-        "march_steps": "of the march in the light's view where the estimate fails, and of reflected photons (1..512)",
-        "view_steps": "of the march in the camera's view (8..16384)",
-        "march": "in the camera's view: hierarchical, or dda: pixel by pixel, the paper's, as a baseline",
-        "internal_bounces": "total reflections followed inside a solid (0..32)",
-        "fresnel": "split: every photon is refracted and reflected, weighted; chance: one of both, drawn",
-        "reflect": "follow light that water and glass throw back (true, false)",
-        "dispersion": "refract red, green and blue apart where a material disperses (true, false)",
-        "denoise": "filter over time and space (true, false); without, the estimate is unbiased and noisy",
-        "denoise_passes": "a-trous passes of the filter (1..8)",
-        "history_frames": "longest memory of the filter (1..1024)",
-    }
-    defaults: ClassVar[Mapping[str, Any]] = {
-        "fresnel": "split",
-        "march": "hierarchical",
-        "reflect": True,
-        "dispersion": True,
-        "denoise": True,
-        "history_frames": 64,
-    }
+    ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = photon_options.LADDER
+    option_help: ClassVar[Mapping[str, str]] = photon_options.HELP
+    defaults: ClassVar[Mapping[str, Any]] = photon_options.DEFAULTS
 
     def __init__(self) -> None:
         self._traced: list[tuple[LightSetup, Branch]] = []
 
     @classmethod
     def validate(cls, options: Mapping[str, Any]) -> None:
-        for name, (low, high) in cls.ranges.items():
-            value = options[name]
-            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-                remedy = f"give a whole number from {low} to {high}"
-                raise UsageError(f"option {name} is {value!r}", where=cls.name, remedy=remedy)
-        for name, words in CHOICES.items():
-            if options[name] not in words:
-                remedy = f"use one of {', '.join(words)}"
-                raise UsageError(f"option {name} is {options[name]!r}", where=cls.name, remedy=remedy)
-        for name in cls.flags:
-            if not isinstance(options[name], bool):
-                raise UsageError(f"option {name} is {options[name]!r}", where=cls.name, remedy="use true or false")
+        photon_options.check(options, cls.name)
 
     # -- declaration --------------------------------------------------------------------------------------------------
 
@@ -148,6 +71,8 @@ class PhotonTrace(CausticsMethod):
             self._declare_views(graph, setup, light, branches)
             for branch in branches:
                 self._declare_trace(graph, setup, light, branch)
+                if photon_strata.is_adaptive(setup.options):
+                    photon_strata.declare(graph, branch, landing_of(branch))
                 self._traced.append((light, branch))
         output = NOISY_IRRADIANCE if setup.options["denoise"] else IRRADIANCE
         graph.add(
@@ -195,6 +120,7 @@ class PhotonTrace(CausticsMethod):
                     "gbuffer.plane",
                     *_march_reads(setup).values(),
                     *(back if branch.kind == SOLID else ()),
+                    *((photon_strata.strata_of(branch),) if photon_strata.is_adaptive(setup.options) else ()),
                 ),
                 note=f"where {branch.words} photons land",
                 view_dependent=True,
@@ -212,6 +138,8 @@ class PhotonTrace(CausticsMethod):
             "RECEIVER_FACES": view.faces,
             "BRANCH": BRANCH_CODE[branch.kind],
             "CHANCE": int(options["fresnel"] == "chance"),
+            "ADAPTIVE": int(photon_strata.is_adaptive(options)),
+            "BLOCKS": photon_strata.BLOCKS,
             "DDA": int(options["march"] == "dda"),
             "SIZED": int(light.light.has_size),
             "ROUGH": int(has_rough_casters(ctx.setup.instances())),
@@ -222,6 +150,8 @@ class PhotonTrace(CausticsMethod):
             program.set_all(self._solid_uniforms(ctx, light))
         if branch.kind == REFLECT:
             program.set(u_receiver_raster_from_world=view.raster_from_world())
+        if photon_strata.is_adaptive(options):
+            program.set(t_strata=ctx.texture(photon_strata.strata_of(branch)))
         low, high = ctx.setup.bounds_ws
         program.set_all(
             {
@@ -247,6 +177,8 @@ class PhotonTrace(CausticsMethod):
                 "u_max_iterations": int(options["max_iterations"]),
                 "u_march_steps": int(options["march_steps"]),
                 "u_view_steps": int(options["view_steps"]),
+                "u_luminance_cutoff": float(options["luminance_cutoff"]),
+                "u_roughness_cutoff": float(options["roughness_cutoff"]),
             }
         )
         ctx.device.draw_fullscreen(program, ctx.target(landing_of(branch), branch.flux))
@@ -307,56 +239,3 @@ def _light_reads(light: LightSetup, branch: Branch) -> dict[str, str]:
 def has_rough_casters(instances: Iterable[Instance]) -> bool:
     """Whether a specular surface scatters light."""
     return any(i.optical_kind is not OpticalKind.DIFFUSE and i.material.roughness > 0.0 for i in instances)
-
-
-def landing_of(branch: Branch) -> str:
-    """Where the photons of a branch land: pixel, 1 / area of the receiver within it, status."""
-    return branch.resource("landing_px")
-
-
-def photon_grid(photons: int, view: LightView) -> tuple[int, int]:
-    """Columns and rows of strata over a light view: about `photons` in all, nearly square on the view."""
-    step = (3, 2) if view.faces == 6 else (1, 1)
-    columns = max(1, round(math.sqrt(photons * view.size[0] / view.size[1]) / step[0])) * step[0]
-    return columns, max(1, round(photons / columns / step[1])) * step[1]
-
-
-def sequence(index: int) -> tuple[float, float, float]:
-    """Element of the R3 sequence, each in [0, 1)."""
-    a = 1.0 / GOLDEN_3D
-    return (index * a) % 1.0, (index * a * a) % 1.0, (index * a * a * a) % 1.0
-
-
-def photon_statistics(branch: Branch, runner: PlanRunner) -> dict[str, Any]:
-    """Photons and their flux by what became of them. Reads two textures back."""
-    landing, flux = (read_rgba32f(runner, r) for r in (landing_of(branch), branch.flux))
-    status = np.rint(landing[..., 3]).astype(int)
-    lumens = flux[..., :3].astype(np.float64).sum(axis=2) / max(sum(branch.channels), 1.0)
-    tried = status != 0
-    total = float(lumens[tried].sum())
-
-    def by(words: Mapping[int, str]) -> dict[str, float]:
-        return {word: float(lumens[status == code].sum()) for code, word in words.items() if (status == code).any()}
-
-    landed, unseen, lost = by(LANDED), by(UNSEEN), by(LOST)
-    flux_lost = sum(lost.values())
-    lookups = flux[..., 3][tried]
-    return {
-        "solve": branch.pass_name("trace"),
-        "rays": int(tried.sum()),
-        "converged": int((status == 1).sum()),
-        "bracketed": int((status == 2).sum()),
-        "unseen": int(np.isin(status, list(UNSEEN)).sum()),
-        "left_the_scene": int((status == LEFT).sum()),
-        "failed": int(np.isin(status, list(LOST)).sum()),
-        "lookups_mean": float(lookups.mean()) if lookups.size else 0.0,
-        "lookups_max": int(lookups.max()) if lookups.size else 0,
-        "flux": total,
-        "flux_landed": sum(landed.values()),
-        "flux_landed_by_view": landed,
-        "flux_unseen_by_cause": unseen,
-        "flux_left_the_scene": float(lumens[status == LEFT].sum()),
-        "flux_lost": float(flux_lost),
-        "flux_lost_by_cause": lost,
-        "flux_lost_share": float(flux_lost / total) if total > 0.0 else 0.0,
-    }

@@ -15,7 +15,9 @@ import pytest
 
 import glcaustics as glc
 from glcaustics.bench.scene_export import beam_scene
+from glcaustics.caustics.branches import read_rgba32f
 from glcaustics.caustics.method import IRRADIANCE
+from glcaustics.caustics.photon_stats import landing_of
 from glcaustics.denoise import svgf
 from glcaustics.optics.fresnel import fresnel_dielectric
 from glcaustics.optics.receivers import PlaneGrid
@@ -97,6 +99,109 @@ def test_chance_has_the_mean_of_split() -> None:
     np.testing.assert_allclose(blocks[1], blocks[0], atol=0.03 * blocks[0].mean())
 
 
+def test_photons_start_where_they_show() -> None:
+    """A view of a ninth of the pattern: strata that follow the last frames take at least half of the variance off at
+    the same number of photons; the mean is that of even strata and so is the flux that starts.
+    """
+    case = case_of("sine-folds")
+    target = (0.4 * case.half_extent_m, -1.0, 0.3 * case.half_extent_m)
+    eye = (target[0], 5.0, target[2])
+    camera = Camera.look_at(eye, target, orthographic=True, ymag_m=case.half_extent_m / 3.0)
+    seen = replace(case.scene, camera=camera)
+    with open_renderer(seen, size=64, photons=1 << 20, denoise=False, stats=False) as renderer:
+        truth = np.mean([green(renderer.render()) for _ in range(6)], axis=0)
+    noise, mean, flux, landed = {}, {}, {}, {}
+    for adaptive in (False, True):
+        with open_renderer(seen, size=64, photons=30_000, denoise=False, adaptive=adaptive, seed=3) as renderer:
+            frames = [renderer.render() for _ in range(24)]
+        images = np.array([green(f) for f in frames[8:]])
+        noise[adaptive] = float(((images - truth) ** 2).mean())
+        mean[adaptive] = float(images.mean() / truth.mean())
+        flux[adaptive] = np.mean([f.stats["solves"][0]["flux"] for f in frames[8:]]) / case.flux_w[1]
+        landed[adaptive] = frames[-1].stats["solves"][0]["converged"]
+    print("variance", noise[True] / noise[False], "mean", mean, "flux", flux, "landed", landed)
+    assert landed[True] > 3 * landed[False]
+    assert noise[True] < 0.5 * noise[False]
+    assert mean[True] == pytest.approx(1.0, abs=0.01) and mean[False] == pytest.approx(1.0, abs=0.01)
+    assert flux[True] == pytest.approx(flux[False], rel=0.005)
+
+
+def lossy_scene() -> Scene:
+    """Light that lands, leaves, is hidden from the eye and falls outside of the picture, refracted and reflected."""
+    water = sheet("water", 1.0, 0.0)
+    others = [
+        plane("floor", 1.2, -1.0),
+        box("slab", (1.2, 0.1, 2.4), (1.6, 1.45, 0.0)),
+        box("post", (0.1, 0.8, 0.1), (0, -0.6, 0)),
+    ]
+    camera = Camera.look_at((0.6, 0.9, 1.8), (0.2, -0.9, 0.0), yfov_rad=0.6)
+    return scene_of([water, *others], [sun(45.0)], camera)
+
+
+def test_every_photon_and_all_flux_is_counted_by_cause() -> None:
+    """Both branches together are what falls on the water, E_perp cos(45 deg) x 4 m^2; in each, the causes add up."""
+    with open_renderer(lossy_scene(), photons=200_000, caster_size=1024, denoise=False) as renderer:
+        solves = [renderer.render() for _ in range(3)][-1].stats["solves"]
+    causes: dict[str, float] = {}
+    for s in solves:
+        assert s["rays"] == sum(s[k] for k in ("converged", "bracketed", "unseen", "left_the_scene", "failed"))
+        parts = [s["flux_landed"], *s["flux_unseen_by_cause"].values(), s["flux_left_the_scene"], s["flux_lost"]]
+        assert sum(parts) == pytest.approx(s["flux"], rel=1e-9)
+        assert s["flux_lost"] == pytest.approx(sum(s["flux_lost_by_cause"].values()), rel=1e-9)
+        assert s["flux_landed"] == pytest.approx(sum(s["flux_landed_by_view"].values()), rel=1e-9)
+        for name in ("flux_unseen_by_cause", "flux_landed_by_view", "flux_lost_by_cause"):
+            causes |= s[name]
+        causes["left"] = causes.get("left", 0.0) + s["flux_left_the_scene"]
+    emitted = sum(s["flux"] for s in solves)
+    print({k: round(v, 4) for k, v in causes.items()}, "emitted", emitted)
+    assert emitted == pytest.approx(4.0 * np.cos(np.radians(45.0)), rel=0.002)
+    expected = {"by_light_view", "by_eye_view", "outside_of_the_picture", "hidden_from_the_eye", "left"}
+    assert all(causes.get(name, 0.0) > 0.0 for name in expected)
+
+
+def test_cutoffs_lose_what_they_say() -> None:
+    """At 45 degrees water reflects 2.8 %: a cut-off of 4 % (the paper's) drops all of it, and it is counted."""
+    options: dict[str, Any] = {"photons": 20_000, "denoise": False}
+    with open_renderer(lossy_scene(), luminance_cutoff=0.04, **options) as renderer:
+        through, reflected = renderer.render().stats["solves"]
+    assert reflected["flux_lost_by_cause"] == {"below_the_luminance_cutoff": pytest.approx(reflected["flux"])}
+    assert through["flux_lost_by_cause"].get("below_the_luminance_cutoff", 0.0) == 0.0
+    scene = lossy_scene()
+    rough = replace(scene.instances[0], material=replace(scene.instances[0].material, roughness=0.4))
+    with open_renderer(
+        replace(scene, instances=(rough, *scene.instances[1:])), roughness_cutoff=0.3, **options
+    ) as renderer:
+        solves = renderer.render().stats["solves"]
+    assert all(s["flux_lost_by_cause"] == {"rougher_than_the_cutoff": pytest.approx(s["flux"])} for s in solves)
+
+
+def test_hierarchical_march_finds_what_the_pixel_exact_one_finds() -> None:
+    """The same pixel within 1 for at least 99.5 % of the photons that land in either."""
+    landings = []
+    for march in ("hierarchical", "dda"):
+        options: dict[str, Any] = {
+            "caster_size": 512,
+            "map_size": 512,
+            "view_steps": 2048,
+            "march": march,
+            "adaptive": False,
+        }
+        with open_renderer(
+            glc.load_scene("flooded-cornell"), size=400, photons=60_000, denoise=False, **options
+        ) as renderer:
+            renderer.render()
+            runner = renderer._runner
+            assert runner is not None
+            found = [read_rgba32f(runner, landing_of(b)) for _, b in renderer._method._traced]  # type: ignore[union-attr]
+        landings.append(np.concatenate([x.reshape(-1, 4) for x in found]))
+    landed = (landings[0][:, 3] > 0) | (landings[1][:, 3] > 0)
+    both = (landings[0][:, 3] > 0) & (landings[1][:, 3] > 0)
+    near = np.abs(landings[0][:, :2] - landings[1][:, :2]).max(axis=1) <= 1.0
+    share = float((both & near).sum() / landed.sum())
+    print(f"{landed.sum()} photons, the same end for {share:.4f}")
+    assert share >= 0.995
+
+
 def hidden_ceiling() -> tuple[Scene, float, float]:
     """Flat water, the sun at 45 degrees, and a slab that hangs where the water throws the light to: its underside is
     seen by no light, only by the eye. Scene, and the slab's height and half width.
@@ -134,8 +239,8 @@ def test_reflective_caustics_where_the_light_does_not_see() -> None:
 
 @pytest.mark.parametrize("light", [sun(45.0), lamp((-0.9, 0.9, 0.0))], ids=["sun", "lamp"])
 def test_no_photon_flies_through_a_thin_strip_that_only_the_light_sees(light: Light) -> None:
-    """A strip of 2 mm by 4 cm, out of the picture, stands in the reflected light: its shadow on the slab is dark. To the
-    lamp the scene is a cube.
+    """A strip of 2 mm by 4 cm, out of the picture, stands in the reflected light: its shadow on the slab is dark. To
+    the lamp the scene is a cube.
     """
     scene, height, _ = hidden_ceiling()
     strip = box("strip", (0.002, 0.04, 3.0), (0.3, 0.1, 0.0))

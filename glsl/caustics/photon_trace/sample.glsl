@@ -9,6 +9,37 @@ uniform ivec2 u_photon_grid;    // strata; for a cube multiples of 3 and 2, so t
 uniform vec3 u_sequence;        // this frame's element of a 3-d low-discrepancy sequence
 uniform uint u_seed;
 
+#if ADAPTIVE
+uniform sampler2D t_strata;     // cumulative shares of the blocks (strata.frag)
+
+// The block of a row of t_strata that a number in [0, 1) falls into, and where in it. xy: position in [0, 1), density.
+vec2 photon_block(float xi, int row, bool over_rows) {
+    int block = 0;
+    vec2 share = vec2(0.0, 1.0);
+    for (int stride = BLOCKS / 2; stride > 0; stride /= 2) {
+        int last = block + stride - 1;
+        float upper = texelFetch(t_strata, over_rows ? ivec2(BLOCKS, last) : ivec2(last, row), 0).r;
+        bool beyond = xi >= upper;
+        block += beyond ? stride : 0;
+        share = beyond ? vec2(upper, share.y) : vec2(share.x, upper);
+    }
+    float width = max(share.y - share.x, 1e-12);
+    return vec2((float(block) + clamp((xi - share.x) / width, 0.0, 0.99999)) / float(BLOCKS), width * float(BLOCKS));
+}
+#endif
+
+// Moves a point of the unit square of the strata onto the view's. Returns how many photons start there, 1 = as if even.
+float photon_warp(inout vec2 uv) {
+#if ADAPTIVE
+    vec2 y = photon_block(uv.y, 0, true);
+    vec2 x = photon_block(uv.x, int(y.x * float(BLOCKS)), false);
+    uv = vec2(x.x, y.x);
+    return x.y * y.y;
+#else
+    return 1.0;
+#endif
+}
+
 struct PhotonStart {
     vec3 position_ws;
     vec3 normal_ws;     // the mesh's own

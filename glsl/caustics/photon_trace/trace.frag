@@ -33,6 +33,8 @@ uniform int u_channel;             // channel whose index of refraction is used
 uniform int u_max_iterations;
 uniform int u_march_steps;
 uniform uint u_frame;
+uniform float u_luminance_cutoff;  // photons that keep less of the light's luminance are not traced (theirs, sec. 3.1: 0.04)
+uniform float u_roughness_cutoff;  // nor those of rougher surfaces (theirs: 0.3)
 
 layout(location = 0) out vec4 o_landing;  // xy: pixel; z: 1 / area of the receiver in it, 1/m^2; w: status (land.glsl; 0 = no photon)
 layout(location = 1) out vec4 o_flux;     // rgb: flux (carried, or lost when status < 0), W or lm; w: look-ups
@@ -40,8 +42,14 @@ layout(location = 1) out vec4 o_flux;     // rgb: flux (carried, or lost when st
 #define PHOTON_DARK -5
 #define PHOTON_AVERTED -6
 #define PHOTON_SECOND_HIT -7
+#define PHOTON_DIM -12
+#define PHOTON_ROUGH -13
 const float STEEPEST = 8.0;        // largest weight of a jittered light point (see below)
 const int ESTIMATE = GLC_HYBRID;
+
+float photon_luminance(vec3 flux) {
+    return dot(flux, vec3(0.2126, 0.7152, 0.0722));
+}
 
 vec3 stratum_flux(GlcView view, vec3 p_ws, vec3 d) {
     float texels = view.size.x * view.size.y / float(u_photon_grid.x * u_photon_grid.y);
@@ -63,7 +71,9 @@ void main() {
     uvec2 cell = uvec2(gl_FragCoord.xy);
     vec3 xi = glc_stratum_point(cell, u_seed, u_sequence);
     GlcView caster_view = glc_caster_view();
-    vec2 at = min((vec2(cell) + xi.xy) / vec2(u_photon_grid) * caster_view.size, caster_view.size - 0.001);
+    vec2 uv = (vec2(cell) + xi.xy) / vec2(u_photon_grid);
+    float density = photon_warp(uv);
+    vec2 at = min(uv * caster_view.size, caster_view.size - 0.001);
     PhotonStart start = photon_start(at);
     if (start.object < 0) return;
     GlcObject object = glc_object(start.object);
@@ -77,9 +87,14 @@ void main() {
     bool from_dense = object.kind == GLC_INTERFACE && start.side < 0.0;
     vec3 n = start.normal_ws * (start.side < 0.0 ? -1.0 : 1.0);
     float n_dot_l = -dot(n, d);
-    vec3 flux = stratum_flux(caster_view, p, d) * u_channels;
+    vec3 flux = stratum_flux(caster_view, p, d) * u_channels / density;
     if (max(flux.r, max(flux.g, flux.b)) <= 0.0) return;   // outside of a spot's cone
-    if (n_dot_l <= 0.0) { o_landing.w = float(PHOTON_AVERTED); o_flux.rgb = flux; return; }
+    if (n_dot_l <= 0.0) {
+        o_landing.w = float(PHOTON_AVERTED);
+        o_flux.rgb = BRANCH == GLC_REFLECT && object.kind != GLC_MIRROR ? vec3(0.0) : flux;   // counted once, where it would go through
+        return;
+    }
+    float light_luminance = photon_luminance(flux) / (u_light.w == 0.0 ? 1.0 : glc_light_cone(d));
 #if SIZED
     // The photon starts where the light's centre sees the caster, and comes from another point of the light. At grazing incidence the
     // weight grows without bound; cutting it costs what falls on the last tan^2 / 64 of the silhouette.
@@ -111,14 +126,19 @@ void main() {
     if (is_reflected != (BRANCH == GLC_REFLECT)) return;
     flux /= is_reflected ? chance : 1.0 - chance;
 #endif
+    flux *= BRANCH == GLC_REFLECT ? reflected : vec3(transmitted);
+    bool is_rough = object.roughness > u_roughness_cutoff;
+    if (is_rough || photon_luminance(flux) < u_luminance_cutoff * light_luminance) {
+        o_landing.w = float(is_rough ? PHOTON_ROUGH : PHOTON_DIM);
+        o_flux.rgb = flux;
+        return;
+    }
     vec3 ray = reflect(d, n);
     float iterations = 0.0;
 #if BRANCH == GLC_REFLECT
-    flux *= reflected;
     bool in_absorber = from_dense;
 #else
     if (!glc_refract(d, n, eta, ray)) { o_landing.w = float(GLC_TIR); o_flux.rgb = flux; return; }
-    flux *= transmitted;
     bool in_absorber = object.kind == GLC_INTERFACE && !from_dense;
 #endif
 #if ROUGH
