@@ -69,7 +69,7 @@ def declare(graph: FrameGraph, setup: FrameSetup, noisy: str, clean: str, desc: 
     graph.add(
         PassDecl(
             "svgf.reproject",
-            {REPROJECTED: color, REPROJECTED_MOMENTS: pair},
+            {REPROJECTED: color, REPROJECTED_MOMENTS: TextureDesc("rgba32f", size)},
             _reproject,
             reads=(DEPTH, NORMAL, MOTION),
             history=(COLOR, MOMENTS, DEPTH, NORMAL),

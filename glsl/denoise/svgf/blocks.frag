@@ -6,7 +6,7 @@ uniform sampler2D t_reprojected;
 uniform sampler2D t_moments;
 
 layout(location = 0) out vec4 o_difference;  // over pixels with a history: sum of new - old, of its square, of 1 / frames, pixels
-layout(location = 1) out vec4 o_noise;       // variance of a pixel: seen in the new frame, in the history; over time: sum, pixels
+layout(location = 1) out vec4 o_noise;       // sums too: variance of a pixel over space, doubt of the resampling; variance over time, pixels
 
 // The mixed difference of a quad of pixels knows nothing of what is constant or runs along one axis, but all of the noise.
 float rough(vec4 quad) {
@@ -18,7 +18,7 @@ void main() {
     o_difference = vec4(0.0);
     o_noise = vec4(0.0);
     ivec2 first = ivec2(gl_FragCoord.xy) * BLOCK, last = textureSize(t_noisy, 0) - 1;
-    float quads = 0.0;
+    vec2 seen = vec2(0.0);
     for (int i = 0; i < BLOCK * BLOCK / 4; ++i) {
         ivec2 corner = first + 2 * ivec2(i % (BLOCK / 2), i / (BLOCK / 2));
         vec4 now = vec4(0.0), then = vec4(0.0);
@@ -34,13 +34,13 @@ void main() {
             frames = min(frames, before.w);
             float difference = now[k] - then[k];
             o_difference += vec4(difference, difference * difference, 1.0 / before.w, 1.0);
+            vec4 moments = texelFetch(t_moments, min(pixel, last), 0);
+            o_noise.y += moments.z;
             if (before.w < 3.5) continue;   // no variance over time to speak of yet
-            vec2 moments = texelFetch(t_moments, min(pixel, last), 0).rg;
             o_noise.zw += vec2(max(moments.y - moments.x * moments.x, 0.0) * before.w / (before.w - 1.0), 1.0);
         }
         if (!whole) continue;
-        o_noise.xy += vec2(rough(now), rough(then) * frames);
-        quads += 1.0;
+        seen += vec2(rough(now), rough(then) * frames);
     }
-    o_noise.xy *= quads > 0.0 ? 4.0 : 0.0;   // a quad for its four pixels
+    o_noise.x = 4.0 * max(seen.x, seen.y);   // a quad for its four pixels
 }

@@ -28,14 +28,16 @@ void main() {
     }
     if (difference.w < 8.0 || difference.y <= 0.0) return;
     // Variance of one pixel in one frame. Over time a change counts as noise, over space fine detail does: the lesser is nearer to it.
-    float over_space = max(noise.x, noise.y) / difference.w;
+    float over_space = noise.x / difference.w;
     float one = noise.w > 0.5 * difference.w ? min(noise.z / noise.w, over_space) : over_space;
     one = max(one, 1e-4 * difference.y / difference.w);
-    float both = one * (1.0 + difference.z / difference.w);     // of new - old, if the light stands still
-    float by_pixels = difference.y / difference.w - PIXELS * both;
+    float both = one * (1.0 + difference.z / difference.w);    // of new - old, if the light stands still
+    // Resampling alone: its errors run along edges, so that a block's and a neighbourhood's pixels share them.
+    float doubt = noise.y / difference.w;
+    float by_pixels = difference.y / difference.w - PIXELS * both - 4.0 * doubt;
     // What the filter over space cannot take is the error that neighbours share: a block's counts as many times as it has pixels.
-    float by_blocks = blocks.x / blocks.y - BLOCKS * both;
-    float by_mean = near.w > 8.0 ? near.x * near.x / near.w - MEAN * both : 0.0;
+    float by_blocks = blocks.x / blocks.y - BLOCKS * both - 16.0 * doubt;
+    float by_mean = near.w > 8.0 ? near.x * near.x / near.w - MEAN * both - 36.0 * doubt : 0.0;
     float change = max(max(by_pixels, by_blocks), max(by_mean, 0.0)) / one;
     o_change = change < 1e6 ? change : 1e6;     // also for NaN
 }

@@ -14,7 +14,7 @@ uniform vec2 u_history_shift;    // uv: of the picture that the history is, agai
 
 in vec2 v_uv;
 layout(location = 0) out vec4 o_color;     // rgb: mean; w: frames in it, 0 = none
-layout(location = 1) out vec2 o_moments;   // of the luminance of single frames
+layout(location = 1) out vec4 o_moments;   // xy: of the luminance of single frames; z: squared doubt of the resampling
 
 vec3 previous_position(vec2 uv, float depth_m) {
     vec2 xy = ((uv - u_previous_jitter) * 2.0 - 1.0) * u_previous_lens.xy * (u_previous_lens.z == 0.0 ? depth_m : 1.0);
@@ -45,7 +45,7 @@ vec4 history_at(ivec2 texel, SvgfSurface here, float width) {
 
 void main() {
     o_color = vec4(0.0);
-    o_moments = vec2(0.0);
+    o_moments = vec4(0.0);
     ivec2 pixel = ivec2(gl_FragCoord.xy), size = textureSize(t_depth_m, 0);
     SvgfSurface here = svgf_surface(pixel);
     if (here.depth_m <= 0.0) return;
@@ -74,13 +74,16 @@ void main() {
         if (!svgf_is_finite(moments.xyxy)) continue;
         vec2 near = mix(1.0 - f, f, vec2(k - 1));
         inner += near.x * near.y * color;
-        o_moments += near.x * near.y * moments;
+        o_moments.xy += near.x * near.y * moments;
         total_inner += near.x * near.y;
     }
-    if (total_inner < 0.01) { o_color = vec4(0.0); o_moments = vec2(0.0); return; }
+    if (total_inner < 0.01) { o_color = vec4(0.0); o_moments = vec4(0.0); return; }
     inner /= total_inner;
-    o_moments /= total_inner;
+    o_moments.xy /= total_inner;
     // Where some of the four are missing, the others are all that is known.
     bool whole = total_inner > 0.999 && total > 0.5;
+    // Two ways to read between the texels differ about as much as either is off.
+    float doubt = whole ? svgf_luminance(o_color.rgb / total - inner.rgb) : 0.0;
+    o_moments.z = doubt * doubt;
     o_color = vec4(whole ? o_color.rgb / total : inner.rgb, inner.w);
 }

@@ -20,6 +20,7 @@ uniform float u_max_frames;
 in vec2 v_uv;
 layout(location = 0) out vec4 o_radiance;
 
+const float AT_REST = 0.3;          // squared change of the smoothed picture by the camera's shifts alone, variances of its surroundings
 const float GAMMA = 1.25;           // half width of the box of likely colours, standard deviations (Salvi 2016)
 
 bool is_finite(vec4 v) {
@@ -76,10 +77,18 @@ vec4 history(vec2 uv) {
     return sum / (w12.x * w12.y + w12.x * (w0.y + w3.y) + w12.y * (w0.x + w3.x));
 }
 
+// The same picture smoothed over 3 x 3 pixels (binomial), as it is shown.
+vec3 smooth_history(vec2 uv) {
+    vec2 half_px = 0.5 / vec2(textureSize(t_before, 0));
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < 4; ++i) sum += shown(max(texture(t_before, uv + half_px * (2.0 * vec2(i & 1, i >> 1) - 1.0)).rgb, 0.0));
+    return 0.25 * sum;
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy), last = textureSize(t_radiance, 0) - 1;
-    vec3 mean = vec3(0.0), square = vec3(0.0), here = vec3(0.0);
-    float count = 0.0, has_here = 0.0;
+    vec3 mean = vec3(0.0), square = vec3(0.0), here = vec3(0.0), smoothed = vec3(0.0);
+    float count = 0.0, weight = 0.0, has_here = 0.0;
     for (int i = 0; i < 9; ++i) {
         vec4 at = vec4(texelFetch(t_radiance, clamp(pixel + ivec2(i % 3, i / 3) - 1, ivec2(0), last), 0).rgb, 0.0);
         if (!is_finite(at)) continue;
@@ -87,10 +96,14 @@ void main() {
         mean += color;
         square += color * color;
         count += 1.0;
+        float w = (i % 3 == 1 ? 2.0 : 1.0) * (i / 3 == 1 ? 2.0 : 1.0);
+        smoothed += w * color;
+        weight += w;
         if (i == 4) { here = color; has_here = 1.0; }
     }
     mean /= max(count, 1.0);
-    vec3 half_width = GAMMA * sqrt(max(square / max(count, 1.0) - mean * mean, 0.0)) + 1e-4 * mean.x;
+    vec3 variance = max(square / max(count, 1.0) - mean * mean, 0.0);
+    vec3 half_width = GAMMA * sqrt(variance) + 1e-4 * mean.x;
     if (has_here == 0.0) here = mean;
     vec2 uv = v_uv - motion_uv(pixel);
     vec4 before = vec4(0.0);
@@ -100,6 +113,10 @@ void main() {
     vec3 old = shown(max(before.rgb, 0.0));
     vec3 off = old - mean, over = abs(off) / max(half_width, vec3(1e-12));
     old = mean + off / max(max(over.x, max(over.y, over.z)), 1.0);
-    float frames = min(before.w + 1.0, u_max_frames);
+    // Light that moves over the surface, or is seen through one that moves, is not where the motion says. The smoothed picture tells it
+    // from aliasing, and the history is then worth fewer frames.
+    float change = smoothed.x / max(weight, 1.0) - smooth_history(uv - u_camera_jitter).x;
+    float moved = max(change * change / max(variance.x + 1e-8 * mean.x * mean.x, 1e-24) - AT_REST, 0.0);
+    float frames = min(1.0 + before.w / (1.0 + before.w * min(moved, 1e6)), u_max_frames);
     o_radiance = vec4(radiance_of(mix(old, here, 1.0 / frames)), frames);
 }
