@@ -40,7 +40,8 @@ def static_frames(
 
     Returns:
         `frame_ms`, `processor_ms`: medians of the frames after the first, wall clock to `finish` and all threads'
-        processor time; `gl_renderer`. Arrays "frame N" (filtered, filtered, 3) float32, N of KEPT_FRAMES.
+        processor time; `gl_renderer`. Arrays: "frame N" (filtered, filtered, 3) float32, N of KEPT_FRAMES; "last"
+        (side, side, 3).
     """
     wall, cpu, arrays = [], [], {}
     with Renderer(
@@ -61,6 +62,7 @@ def static_frames(
             if number in KEPT_FRAMES or number == frames:
                 image = renderer.render().aov["caustic_irradiance"]
                 arrays[f"frame {number}"] = box_filter(image, (filtered, filtered)).astype(np.float32)
+                arrays["last"] = image
                 continue
             renderer.draw()
             renderer.device.ctx.finish()
@@ -71,27 +73,17 @@ def static_frames(
     return times | {"frames": frames, "gl_renderer": name, "options": dict(options)}, arrays
 
 
-def final_picture(
-    scene: Scene, size: tuple[int, int], frames: int, options: Mapping[str, Any], backend: str
-) -> npt.NDArray[np.uint8]:
-    """(H, W, 3) sRGB after some frames of a still, water and all as the eye sees it."""
-    with Renderer(scene, size, METHOD, QUALITY, backend, options=options, stats=False) as renderer:
-        for _ in range(frames - 1):
-            renderer.draw()
-        return renderer.render().ldr
+def picture_with(scene: Scene, irradiance: npt.NDArray[np.floating], backend: str) -> npt.NDArray[np.uint8]:
+    """(H, W, 3) sRGB, water and all as the eye sees it, with a given caustic irradiance (H, W, 3) at the receivers.
 
-
-def picture_with(
-    scene: Scene, irradiance: npt.NDArray[np.floating], frames: int, backend: str
-) -> npt.NDArray[np.uint8]:
-    """The same picture with a given caustic irradiance (H, W, 3) at the receivers: all else is the renderer's."""
+    With a method's own irradiance it is that method's picture, bit for bit: all else is the renderer's.
+    """
     size = (irradiance.shape[1], irradiance.shape[0])
     with (
         given_irradiance(irradiance.astype(np.float32)) as method,
         Renderer(scene, size, method, QUALITY, backend, stats=False) as renderer,
     ):
-        for _ in range(frames - 1):  # reflections seen in water are seeded with the frame before
-            renderer.draw()
+        renderer.draw()  # reflections seen in water are seeded with the frame before
         return renderer.render().ldr
 
 
@@ -140,7 +132,7 @@ def _renderer(scene: Scene, size: tuple[int, int], options: Mapping[str, Any], b
 
 
 def stages_of(timings: Mapping[str, float]) -> dict[str, float]:
-    """Sum of the passes' times by stage, and `reflected` of the tracing; passes of passes ("a/b") are in their parent already."""
+    """Sum of the passes' times by stage, and `reflected` of the tracing; "a/b" is in "a" already."""
     found = dict.fromkeys((*STAGES, "reflected"), 0.0)
     for name, ms in timings.items():
         stage = next((stage for stage, prefixes in STAGES.items() if name.startswith(prefixes)), None)

@@ -19,7 +19,6 @@ from glcaustics.bench.peers import PtracerPeer, has_denoiser
 from glcaustics.bench.photons import (
     KEPT_FRAMES,
     QUALITY,
-    final_picture,
     photon_options,
     picture_with,
     stage_table,
@@ -54,6 +53,7 @@ class PhotonsPart:
     peers: bool = True
     images: dict[str, FloatArray] = field(default_factory=dict)
     pictures: dict[str, npt.NDArray[np.uint8]] = field(default_factory=dict)
+    _kept: dict[str, Measured] = field(default_factory=dict)
 
     @property
     def settings(self) -> PhotonPlan:
@@ -114,21 +114,26 @@ class PhotonsPart:
 
     # -- frames of a still --------------------------------------------------------------------------------------------
 
-    def _frames(self, scene: Scene, side: int, what: str, options: dict[str, Any]) -> Measured:
+    def _frames(self, scene: Scene, side: int, photons: int | None) -> Measured:
+        """Of so many photons and the plan's light views; None: of the quality as it is."""
         p = self.settings
+        options = {} if photons is None else photon_options(photons, p.view_size)
+        what = f"{QUALITY} quality" if photons is None else f"{photons} photons"
 
         def make() -> Measured:
             return static_frames(scene, side, p.filtered, p.frames, options, self.cells.backend)
 
         key = self._key(scene, "frames", side, p.filtered, p.frames, options)
-        return self.cells.cell(f"{scene.name}: {p.frames} frames, {what}, {side}^2", key, make)
+        if key in self._kept:
+            return self._kept[key]
+        self._kept[key] = found = self.cells.cell(f"{scene.name}: {p.frames} frames, {what}, {side}^2", key, make)
+        return found
 
     def _static(self, scene: Scene, truth: ViewReference) -> list[dict[str, Any]]:
         """Errors of irradiance, all channels, over all pixels and over those that show one surface alone."""
         p, found = self.settings, []
         for photons in p.photons:
-            options = photon_options(photons, p.view_size)
-            document, arrays = self._frames(scene, p.side, f"{photons} photons", options)
+            document, arrays = self._frames(scene, p.side, photons)
             series = [{"frames": number, **_errors(truth, arrays[f"frame {number}"])} for number in self._kept_frames()]
             found.append({"photons": photons, "side": p.side, **document, "series": series, **series[-1]})
             self.images[f"{scene.name} view {photons}"] = luminance(arrays[f"frame {p.frames}"])
@@ -142,27 +147,23 @@ class PhotonsPart:
 
     def _final(self, scene: Scene, truth: ViewReference) -> list[dict[str, Any]]:
         """LDR-FLIP of the picture against the same renderer's picture with the reference's irradiance in it."""
-        p, found = self.settings, []
-        digest_of_truth = [p.side, p.cells, float(truth.mean.mean()), truth.noise]
-
-        def make_truth() -> Measured:
-            return {}, {"ldr": picture_with(scene, truth.mean, p.frames, self.cells.backend)}
-
-        key = self._key(scene, "given", digest_of_truth, p.frames)
-        reference = self.cells.cell(f"{scene.name}: picture with the reference in it", key, make_truth)[1]["ldr"]
+        reference = self._picture(scene, "the reference", truth.mean)
         self.pictures[f"{scene.name} with the reference"] = reference
-        for photons in p.photons:
-            options = photon_options(photons, p.view_size)
-
-            def make(options: dict[str, Any] = options) -> Measured:
-                size = (p.side, p.side)
-                return {}, {"ldr": final_picture(scene, size, p.frames, options, self.cells.backend)}
-
-            key = self._key(scene, "final", p.side, p.frames, options)
-            ldr = self.cells.cell(f"{scene.name}: picture, {photons} photons", key, make)[1]["ldr"]
+        found = []
+        for photons in self.settings.photons:
+            irradiance = self._frames(scene, self.settings.side, photons)[1]["last"]
+            ldr = self._picture(scene, f"{photons} photons", irradiance)
             self.pictures[f"{scene.name} {photons} photons"] = ldr
             found.append({"photons": photons, "flip": flip_of(reference / 255.0, ldr / 255.0)})
         return found
+
+    def _picture(self, scene: Scene, what: str, irradiance: npt.NDArray[np.floating]) -> npt.NDArray[np.uint8]:
+        def make() -> Measured:
+            return {}, {"ldr": picture_with(scene, irradiance, self.cells.backend)}
+
+        key = self._key(scene, "picture", np.asarray(irradiance, np.float32))
+        ldr: npt.NDArray[np.uint8] = self.cells.cell(f"{scene.name}: picture, {what}", key, make)[1]["ldr"]
+        return ldr
 
     # -- cost ---------------------------------------------------------------------------------------------------------
 
@@ -190,7 +191,7 @@ class PhotonsPart:
             row = row | {"errors": {"rrmse": _masked(halves, image, mask)}}
             (clean_rows if "oidn" in row["method"] else rows).append(row)
         ours = []
-        document, arrays = self._frames(scene, p.filtered, QUALITY, {})
+        document, arrays = self._frames(scene, p.filtered, None)
         for number in self._kept_frames():
             error = _masked(halves, luminance(arrays[f"frame {number}"]), mask)
             entry = compare(error, number * document["frame_ms"], rows, clean_rows)

@@ -101,7 +101,7 @@ def _static_table(one: Mapping[str, Any]) -> Table:
         rows.append(
             [*cells, "" if flip is None else f"{flip:.4f}", f"{row['frame_ms']:.0f}", f"{row['processor_ms']:.0f}"]
         )
-    frames = [f"{s['frames']} frames" for s in one["static"][0]["series"]]
+    frames = [_frames(s["frames"]) for s in one["static"][0]["series"]]
     head = ("photons a frame", *frames, "without edges", "bias", "FLIP of the picture", "frame ms", "processor ms")
     note = (
         f"picture {p['side']}^2, light views {p['view_size']}^2; {reference['source']}, noise "
@@ -116,10 +116,14 @@ def _static_table(one: Mapping[str, Any]) -> Table:
     return Table(title, head, rows, note)
 
 
+def _frames(number: int) -> str:
+    return f"{number} frame" if number == 1 else f"{number} frames"
+
+
 def _equal_time_table(one: Mapping[str, Any]) -> Table:
     equal, rows = one["equal"], []
     for e in equal["ours"]:
-        cells = [f"photon_trace {e['quality']}, {e['frames']} frames", f"{e['ms']:.0f}", f"{e['rrmse']:.4f}"]
+        cells = [f"photon_trace {e['quality']}, {_frames(e['frames'])}", f"{e['ms']:.0f}", f"{e['rrmse']:.4f}"]
         rows.append([*cells, ratio_text(e, PTRACER), ratio_text(e, DENOISED)])
     for name in (PTRACER, DENOISED):
         rows += [

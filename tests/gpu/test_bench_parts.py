@@ -12,7 +12,6 @@ from glcaustics.bench.given import given_irradiance
 from glcaustics.bench.photons import (
     MARCHES,
     STAGES,
-    final_picture,
     photon_options,
     picture_with,
     same_hits,
@@ -46,10 +45,11 @@ def test_a_given_irradiance_makes_the_frame_of_the_method_that_made_it() -> None
     ) as renderer:  # fmt: skip
         irradiance = renderer.render().aov["caustic_irradiance"]
     with glc.Renderer(scene, SIZE, "caustic_map", "medium", BACKEND, options=options) as renderer:
+        renderer.draw()
         expected = renderer.render().ldr
     with glc.Renderer(scene, SIZE, "none", "medium", BACKEND) as renderer:
         dark = renderer.render().ldr
-    assert np.array_equal(picture_with(scene, irradiance, 1, BACKEND), expected)
+    assert np.array_equal(picture_with(scene, irradiance, BACKEND), expected)
     assert not np.array_equal(dark, expected)
     assert dict(METHODS) == before
 
@@ -64,7 +64,7 @@ def test_a_given_irradiance_of_another_size_is_refused() -> None:
 def test_static_frames_are_those_of_the_renderer() -> None:
     scene, options = room(), photon_options(2000, 64)
     document, arrays = static_frames(scene, 32, 16, 4, options, BACKEND)
-    assert sorted(arrays) == ["frame 1", "frame 2", "frame 4"]
+    assert sorted(arrays) == ["frame 1", "frame 2", "frame 4", "last"]
     assert document["frame_ms"] > 0.0 and arrays["frame 4"].shape == (16, 16, 3)
     with glc.Renderer(
         scene, (32, 32), "photon_trace", "medium", BACKEND,
@@ -73,7 +73,7 @@ def test_static_frames_are_those_of_the_renderer() -> None:
         frames = [renderer.render().aov["caustic_irradiance"] for _ in range(4)]
     mean = frames[-1].astype(np.float64).reshape(16, 2, 16, 2, 3).mean(axis=(1, 3))
     assert arrays["frame 4"] == pytest.approx(mean, rel=1e-5, abs=1e-5 * mean.mean())
-    assert final_picture(scene, (32, 32), 2, options, BACKEND).shape == (32, 32, 3)
+    assert arrays["last"] == pytest.approx(frames[-1], rel=1e-5, abs=1e-5 * mean.mean())
 
 
 def test_stages_and_hits_of_both_marches() -> None:
