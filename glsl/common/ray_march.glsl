@@ -119,6 +119,8 @@ GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRaster
             cell *= skips ? (up ? 4.0 : 1.0) : 0.25;
             if (ended) break;
         }
+        // To the sample, not the cell: what lies behind a rim is continued from there.
+        if (front) solve.u_front = clamp((at - 1.0) * du, 0.0, ray.u_screen);
         bool again = false;
         for (; i < max_steps && !ended; ++i) {
             float u = again ? solve.u : min(at * du, ray.u_screen);
@@ -138,6 +140,7 @@ GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRaster
             hit = within && close;
             solve = GlcSolve(close ? met : u, solve.u_front, texel, error_px, GLC_SOLVE_HIT, i + 1);
             front = again ? front : over;
+            solve.u_front = front ? max(solve.u_front, u) : solve.u_front;
             again = close && !hit && !again;
             // In a cell that is one plane, on to where that is met.
             bool flat_cell = range < 5.0 * (abs(plane.x) + abs(plane.y));
@@ -148,7 +151,6 @@ GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRaster
             if (hit || (!again && (at >= leave || ended))) break;
         }
         if (hit) break;
-        solve.u_front = front ? min((at - 1.0) * du, ray.u_screen) : solve.u_front;
     }
     if (hit) return solve;
     if (crossed.x >= 0.0) return GlcSolve(crossed.x, crossed.x, crossed.yz, 0.0, GLC_SOLVE_HIT, i);
