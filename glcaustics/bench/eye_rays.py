@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from glcaustics.bench.convergence import ITERATIONS, SCENES, look_at, pooled, seeded_cameras
-from glcaustics.bench.eye_truth import EyeTruth, eye_truth, has_open_surface
+from glcaustics.bench.eye_truth import EyeTruth, eye_truth, has_open_surface, solid_truth
 from glcaustics.errors import UsageError
+from glcaustics.gpu import create_device
 from glcaustics.renderer import Renderer
 from glcaustics.scene.load import load_scene
 from glcaustics.scene.model import Camera, FloatArray, Scene
@@ -122,6 +123,30 @@ def eye_convergence(
     ]
 
 
+def solids_truth(
+    scene: Scene, cameras: Sequence[Camera], size: tuple[int, int], iterations: Sequence[int], **renderer: Any
+) -> list[EyeTruth]:
+    """What the frame shows through solids against float64 ray casting; orthographic cameras are left out."""
+    views = []
+    with create_device(str(renderer.get("backend", "auto"))) as device:
+        for camera in cameras:
+            if not camera.orthographic:
+                exact, seen, rays = solid_truth(scene, camera, size, device)
+                if seen.any():
+                    views.append((camera, exact[::-1][seen[::-1]], seen[::-1], rays))  # AOVs have row 0 on top
+    shares: list[list[float]] = [[] for _ in views]
+    for name, counts in (("newton", iterations), ("dda", (4,))):
+        with _solver(scene, size, name, **renderer) as solve:
+            for (camera, exact, seen, _), found in zip(views, shares, strict=True):
+                for count in counts:
+                    px = solve(camera, count)[1]
+                    found.append(float(_near(px[seen], exact).mean()))
+    return [
+        EyeTruth(rays, float(seen.sum()) / rays, tuple(iterations), tuple(found[:-1]), found[-1])
+        for (_, _, seen, rays), found in zip(views, shares, strict=True)
+    ]
+
+
 def _near(px: FloatArray, hit: FloatArray) -> Any:
     return np.abs(px - hit).max(axis=-1) <= 1.0
 
@@ -144,7 +169,8 @@ def eye_study(
     Returns:
         `size`, `views`, `seed`, `iterations`, `seconds`, `published` (see PUBLISHED) and `scenes`: for each `scene`,
         `seconds`, `pooled` (shares over the resolvable pixels of all views), `views` (EyeConvergence each) and
-        `by_ray_casting`: `pooled` and `views` of EyeTruth, None where no open surface refracts.
+        `by_ray_casting`: `pooled` and `views` of EyeTruth: of open surfaces, or of solids where there are no others,
+        then with all that the search for the way out adds to the error; None where neither shows anything.
     """
     begin, rows = time.perf_counter(), []
     for name in scenes:
@@ -171,9 +197,10 @@ def _study_scene(
 ) -> dict[str, Any]:
     start, cameras = time.perf_counter(), seeded_cameras(scene, views, seed)
     row = {"scene": scene.name, **_both(eye_convergence(scene, cameras, size, iterations, **renderer))}
-    truth = []
     if has_open_surface(scene):
         truth = eye_truth(scene, cameras, size, iterations, str(renderer.get("backend", "auto")))
+    else:
+        truth = solids_truth(scene, cameras, size, iterations, **renderer)
     return {**row, "by_ray_casting": _both(truth) if truth else None, "seconds": time.perf_counter() - start}
 
 

@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from glcaustics.bench.convergence import ITERATIONS
-from glcaustics.bench.scene_export import beam_mesh
+from glcaustics.bench.scene_export import beam_mesh, beam_scene
 from glcaustics.bench.solver_variants import Buffers, VariantBench, ray_from_px, scene_buffers
-from glcaustics.gpu import create_device
+from glcaustics.gpu import Device, create_device
+from glcaustics.optics.beam_paths import PathTracer
 from glcaustics.optics.beam_scene import BeamScene
 from glcaustics.optics.raycast import RayCaster
 from glcaustics.scene.model import Camera, OpticalKind, Scene
@@ -44,7 +45,7 @@ class EyeTruth:
 
 
 def has_open_surface(scene: Scene) -> bool:
-    """Whether there is a surface of one interface, such as water; the way through solids is judged elsewhere."""
+    """Whether there is a surface of one interface, such as water."""
     return any(i.optical_kind is OpticalKind.INTERFACE for i in scene.instances_at(0.0))
 
 
@@ -80,6 +81,31 @@ def eye_truth(
             found.append(EyeTruth(rays, float(resolvable.sum()) / rays, tuple(iterations), shares, near("dda", MANY)))
             bench.release()
     return found
+
+
+def solid_truth(
+    scene: Scene, camera: Camera, size: tuple[int, int], device: Device
+) -> tuple[FloatArray, BoolArray, int]:
+    """The way through solids, in and out again, with the triangles' interpolated normals.
+
+    Returns:
+        Pixel coordinates (H, W, 2) of where each eye ray ends, the mask (H, W) where the camera sees that, and the
+        number of rays that go through.
+    """
+    traced = beam_scene(scene, analytic_water=False)
+    buffers = scene_buffers(device, scene, camera, size)
+    x, y = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
+    grid = np.stack([x, y, np.ones_like(x)], axis=-1)
+    state = buffers.camera
+    ray = (grid @ ray_from_px(state, size).T).reshape(-1, 3)
+    origin = np.array(np.broadcast_to(state.world_from_camera[:3, 3], ray.shape), np.float64)
+    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+    landed = PathTracer(traced, RayCaster(traced)).follow(origin, ray, "TT", from_light=False)
+    through = landed.signature >= 0
+    px, depth = _project(buffers, landed.point_ws)
+    inside = through & (depth > 0.0) & np.all((px >= 0.0) & (px < np.asarray(size)), axis=1)
+    seen = inside & _stored(buffers, landed.point_ws, landed.normal_ws, px, depth)
+    return px.reshape(*x.shape, 2), seen.reshape(x.shape), int(through.sum())
 
 
 def ray_truth(caster: RayCaster, buffers: Buffers) -> tuple[FloatArray, BoolArray]:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import glcaustics as glc
-from glcaustics.bench.convergence import pooled
-from glcaustics.bench.eye_rays import PUBLISHED, eye_convergence, eye_study
+from glcaustics.bench.convergence import pooled, seeded_cameras
+from glcaustics.bench.eye_rays import PUBLISHED, eye_convergence, eye_study, solids_truth
 from glcaustics.bench.eye_truth import eye_truth
 from glcaustics.bench.light_rays import LightConvergence, light_convergence, light_study, seeded_lights
 from glcaustics.bench.light_solver import LightSolver
@@ -72,6 +72,24 @@ def test_eye_rays_agree_with_float64_ray_casting() -> None:
     assert 0.7 < found.resolvable < 0.999, "what the stone hides from the eye is not resolvable"
     assert found.within_1px[0] < 0.2 < found.within_1px[1] < found.within_1px[2]
     assert found.within_1px[2] > 0.98 and found.dda > 0.98
+
+
+def test_a_way_through_glass_agrees_with_float64_ray_casting() -> None:
+    """In and out of a ball: the start is the exit's own pixel, one step on a floor is exact."""
+    scene = glc.load_scene("glass-sphere")
+    cameras = seeded_cameras(scene, 2)
+    for found in solids_truth(scene, cameras, (192, 108), (0, 1, 4), backend=BACKEND):
+        assert found.pixels > 500 and found.resolvable > 0.5
+        assert found.within_1px[0] < 0.3 and min(found.within_1px[1:]) > 0.9 and found.dda > 0.9
+
+
+def test_cameras_show_what_refracts() -> None:
+    """Water from all around, glass from its front: each seeded view of the statue has it in the picture."""
+    scene = glc.load_scene("glass-statue")
+    with glc.Renderer(scene, (64, 36), "none", backend=BACKEND, aovs=("solve_status",)) as renderer:
+        for camera in seeded_cameras(scene, 6):
+            renderer.tune(camera=camera)
+            assert (renderer.render().aov["solve_status"] > 0.0).mean() > 0.05
 
 
 def light_rays(scene: Scene, iterations: tuple[int, ...] = (0, 1, 2, 4)) -> LightConvergence:
