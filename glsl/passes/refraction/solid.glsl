@@ -5,16 +5,51 @@ uniform sampler2D t_back_plane;
 uniform sampler2D t_back_normal;
 
 const int SOLID_ITERATIONS = 5;
+// How far off its own surface a reflected ray starts, of the way to there: rounding must not put it behind.
+const float REFLECTED_START = 2e-3;
+const int REFLECTED_STEPS = 4;
 
-// Where the ray leaves the solid, on the layer that it runs towards. n: unit, against the ray. False: an estimate.
-bool solid_exit(vec3 p, vec3 d, out vec3 exit_ws, out vec3 n, out float t) {
+// After a reflection the surface that the ray leaves says nothing of where it goes. Steps that treble, from a fifth of the way
+// before the reflection (leg_m), bracket the exit: the ray between the last point inside and the first one outside. span: (first,
+// last) of `ray`, in [0, 1].
+GlcRasterRay solid_bracket(sampler2D t_layer, GlcRasterRay ray, float facing, float leg_m, out vec2 span) {
+    span = vec2(0.0, 1.0);
+    float distance_m = 0.2 * leg_m;
+    for (int i = 0; i < REFLECTED_STEPS; ++i) {
+        // The inverse of glc_raster_distance.
+        float u = min(distance_m * ray.w.y / max(ray.length_m * ray.w.x - distance_m * (ray.w.x - ray.w.y), 1e-30), ray.u_screen);
+        vec2 px = clamp(ray.start.xy + u * ray.step.xy, vec2(0.0), u_raster_size - 1.0);
+        vec4 plane = texelFetch(t_layer, ivec2(px), 0);
+        vec2 f = facing * glc_raster_plane(ray, plane);
+        bool inside = plane.w > 0.0 && u * f.y >= f.x;
+        span = inside ? vec2(u, span.y) : vec2(span.x, u);
+        if (!inside || u >= ray.u_screen) break;
+        distance_m *= 3.0;
+    }
+    GlcRasterRay part = ray;
+    part.start = ray.start + span.x * ray.step;
+    part.step = (span.y - span.x) * ray.step;
+    part.u_screen = 1.0;
+    return part;
+}
+
+// Where the ray leaves the solid, on the layer that it runs towards. leg_m: the way inside before a reflection, 0 on entry. n: unit,
+// against the ray. False: an estimate.
+bool solid_exit(vec3 p, vec3 d, float leg_m, out vec3 exit_ws, out vec3 n, out float t) {
     GlcRasterRay ray = eye_ray(p, d);
     bool away = ray.step.z < 0.0;   // s falls: the ray goes away from the eye
     GlcSolve solve;
-    if (away) solve = glc_newton(t_back_plane, ray, 1.0, SOLID_ITERATIONS);
-    else solve = glc_newton(t_front_plane, ray, -1.0, SOLID_ITERATIONS);
+    vec2 span = vec2(0.0, 1.0);
+    GlcRasterRay part = ray;
+    if (away) {
+        if (leg_m > 0.0) part = solid_bracket(t_back_plane, ray, 1.0, leg_m, span);
+        solve = glc_newton(t_back_plane, part, 1.0, SOLID_ITERATIONS);
+    } else {
+        if (leg_m > 0.0) part = solid_bracket(t_front_plane, ray, -1.0, leg_m, span);
+        solve = glc_newton(t_front_plane, part, -1.0, SOLID_ITERATIONS);
+    }
     // An unsolved exit (outlines, mostly) ends at the last point inside.
-    float u = solve.status == GLC_SOLVE_HIT ? solve.u : min(solve.u, solve.u_front);
+    float u = mix(span.x, span.y, solve.status == GLC_SOLVE_HIT ? solve.u : min(solve.u, solve.u_front));
     vec2 uv = clamp((ray.start.xy + u * ray.step.xy) / u_raster_size, vec2(0.0), vec2(1.0));
     vec3 stored = away ? textureLod(t_back_normal, uv, 0.0).xyz : texelFetch(t_specular_normal, ivec2(uv * u_raster_size * 0.99999), 0).xyz;
     n = glc_safe_normalize(stored, -d);
@@ -27,15 +62,17 @@ bool solid_exit(vec3 p, vec3 d, out vec3 exit_ws, out vec3 n, out float t) {
 // On entry d is the direction inside. tint takes Fresnel and absorption. Returns false where the light is still held inside after
 // one total internal reflection; d is then the direction that it would go on in.
 bool solid_through(inout vec3 p, inout vec3 d, float ior, vec3 sigma_a, inout vec3 tint) {
+    float leg_m = 0.0;
     for (int bounce = 0; bounce < 2; ++bounce) {
         vec3 exit_ws, n, outside;
         float t;
         // The other side of the solid is often hidden after a reflection inside: then the mirrored direction alone goes on.
-        if (!solid_exit(p, d, exit_ws, n, t) && bounce > 0) return false;
+        if (!solid_exit(p, d, leg_m, exit_ws, n, t) && bounce > 0) return false;
         tint *= glc_transmittance(sigma_a, t);
         bool leaves = glc_refract(d, n, 1.0 / ior, outside);
         if (leaves) tint *= 1.0 - glc_fresnel_dielectric(-dot(n, d), 1.0 / ior);
-        p = exit_ws;
+        p = leaves ? exit_ws : exit_ws + REFLECTED_START * t * outside;
+        leg_m = t;
         d = outside;
         if (leaves) return true;
     }
