@@ -7,6 +7,9 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
+from glcaustics.gpu import Device
 from glcaustics.renderer import Renderer
 from glcaustics.scene.model import Camera, Scene
 
@@ -41,22 +44,24 @@ def eye_cost(
             )
             for solver in solvers
         }
-        for each in made.values():
+        units = {}
+        for solver, each in made.items():
+            each.device.make_current()
             each.device.count_processor_time()
+            units[solver] = _FetchPass(each.device, size)
+            stack.callback(units[solver].release)
         for index in range(rounds + 1):  # the first one compiles and uploads
             for solver, each in made.items():
                 each.device.make_current()
                 each.draw()
                 timings = each.device.finish_timings()
-                fetch = _fetch_pass_ms(each, size)
+                fetch = units[solver].milliseconds()
                 if index == 0:
                     continue
                 fetches.append(fetch)
                 for name in (*_PARTS, *(f"refraction/{stage}" for stage in _STAGES)):
                     if name in timings:
                         samples[solver].setdefault(name, []).append(timings[name])
-        for each in made.values():
-            each.device.make_current()
     unit = statistics.median(fetches)
     costs = {}
     for solver, parts in samples.items():
@@ -65,17 +70,25 @@ def eye_cost(
     return costs
 
 
-def _fetch_pass_ms(renderer: Renderer, size: tuple[int, int]) -> float:
-    device = renderer.device
-    source = device.texture(size, "rgba32f", label="eye_cost.source")
-    target = device.texture(size, "rgba32f", label="eye_cost.target")
-    framebuffer = device.framebuffer([target])
-    program = device.program("passes/refraction/fetch").set(t_source=source)
-    device.draw_fullscreen(program, framebuffer)  # touches the memory
-    with device.timer("eye_cost/fetch"):
-        device.draw_fullscreen(program, framebuffer)
-    milliseconds = device.finish_timings()["eye_cost/fetch"]
-    framebuffer.release()
-    source.release()
-    target.release()
-    return milliseconds
+class _FetchPass:
+    """The unit of cost: one full-screen pass that copies its own pixel of a texture that holds data."""
+
+    def __init__(self, device: Device, size: tuple[int, int]) -> None:
+        ones = np.ones((size[1], size[0], 4), np.float32)
+        self._source = device.texture(size, "rgba32f", data=ones, label="eye_cost.source")
+        self._target = device.texture(size, "rgba32f", label="eye_cost.target")
+        self._framebuffer = device.framebuffer([self._target])
+        self._device = device
+        self.milliseconds()  # touches the memory
+
+    def milliseconds(self) -> float:
+        program = self._device.program("passes/refraction/fetch").set(t_source=self._source)
+        with self._device.timer("eye_cost/fetch"):
+            self._device.draw_fullscreen(program, self._framebuffer)
+        return self._device.finish_timings()["eye_cost/fetch"]
+
+    def release(self) -> None:
+        self._device.make_current()
+        self._device.release_framebuffers([self._framebuffer])
+        self._source.release()
+        self._target.release()
