@@ -241,9 +241,8 @@ def test_weeds_are_held_by_the_cascade() -> None:
 
 
 def test_weeds_at_a_grazing_angle() -> None:
-    """Longer rays, more edges: Newton's false claims stay under 5 %."""
+    """Longer rays, more edges: the cascade still keeps 99.5 %, though Newton's false claims come to 5 %."""
     [found] = eye_convergence(weeds(), [GRAZING], (480, 270), (0, 4, 8), backend=BACKEND)
-    assert found.resolvable > 0.5 and found.hierarchical >= 0.995
+    assert found.resolvable > 0.5 and found.cascade >= 0.995 and found.hierarchical >= 0.995
     assert found.within_1px[2] >= found.within_1px[1] > 0.8
     assert max(found.wrong) < 0.05
-    print(f"\nweeds, grazing: cascade {found.cascade:.4f}")

@@ -29,7 +29,8 @@ uniform int u_refraction_steps;
 uniform int u_reflection_steps;
 
 // Points of a ray at which the cascade looks for what may stand before it.
-const int CLEAR_POINTS = 6;
+// With 6, thin blades at a grazing angle cost the cascade 1.1 % of what the DDA finds; with 12, 0.4 %, for 2 % of the frame.
+const int CLEAR_POINTS = 12;
 const int REFLECTION_ITERATIONS = 3;
 
 #if HAS_SECOND
