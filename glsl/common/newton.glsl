@@ -60,6 +60,7 @@ GlcSolve glc_newton_from(sampler2D t_plane, GlcRasterRay ray, float facing, floa
     return solve;
 }
 
+// The same, from the ray's own pixel: the start of Mayer et al.
 GlcSolve glc_newton(sampler2D t_plane, GlcRasterRay ray, float facing, int max_iterations) {
     return glc_newton_from(t_plane, ray, facing, 0.0, max_iterations);
 }

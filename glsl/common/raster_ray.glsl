@@ -29,6 +29,7 @@ GlcRasterRay glc_raster_ray_from(mat4 raster_from_world, vec2 size, vec3 start, 
     return ray;
 }
 
+// From a world point (metres), along a unit direction of world space, length_m metres long; otherwise the same.
 GlcRasterRay glc_raster_ray(mat4 raster_from_world, vec2 size, vec3 origin_ws, vec3 d_ws, float length_m) {
     vec4 q = raster_from_world * vec4(origin_ws, 1.0);
     return glc_raster_ray_from(raster_from_world, size, q.xyz / q.w, q.w, d_ws, length_m);

@@ -62,6 +62,7 @@ GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, 
     return solve;
 }
 
+// The same, where nobody asks whether the ray stayed in view.
 GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, GlcRasterRay ray, int max_steps) {
     bool in_view;
     return glc_march_dda(t_depth, t_plane, orthographic, ray, max_steps, in_view);
@@ -161,6 +162,7 @@ GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRaster
     return solve;
 }
 
+// The same, where nobody asks whether the ray stayed in view.
 GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRasterRay ray, int max_steps) {
     bool in_view;
     return glc_march_hierarchical(t_bounds, t_plane, ray, max_steps, in_view);
