@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 from glcaustics.errors import UsageError
 
@@ -31,3 +32,13 @@ def check_aovs(names: Iterable[str], known: Mapping[str, str]) -> tuple[str, ...
     for name in asked:
         check_name(name, ("all", *known), option="--aov", kind="AOV")
     return tuple(dict.fromkeys(known if "all" in asked else asked))
+
+
+def check_settings(settings: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """`--set KEY=VALUE` as options. Raises UsageError for a key given twice."""
+    options: dict[str, Any] = {}
+    for key, value in settings:
+        if key in options:
+            raise UsageError(f"{key} is set twice", where="--set", remedy="keep one")
+        options[key] = value
+    return options

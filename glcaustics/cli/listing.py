@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from glcaustics.cli.choices import check_aovs, check_method
+from glcaustics.cli.choices import check_aovs, check_method, check_settings
 
 
 def plan_command(args: argparse.Namespace) -> int:
@@ -14,7 +14,8 @@ def plan_command(args: argparse.Namespace) -> int:
 
     method, aovs = check_method(args.method), check_aovs(args.aov, AOVS)
     scene = load_scene(args.scene)
-    plan = plan_frame(scene, args.size, method, args.quality or scene.quality or "medium", aovs)
+    quality, options = args.quality or scene.quality or "medium", check_settings(args.settings)
+    plan = plan_frame(scene, args.size, method, quality, aovs, options=options)
     print(plan.to_dot() if args.dot else plan.explain())
     return 0
 
@@ -34,6 +35,7 @@ def scenes_command(args: argparse.Namespace) -> int:
 def methods_command(args: argparse.Namespace) -> int:
     """Prints every caustics method with its paper and its quality ladder."""
     from glcaustics.caustics.registry import METHODS
+    from glcaustics.passes.options import OPTION_HELP
 
     for name, method in METHODS.items():
         print(
@@ -43,4 +45,7 @@ def methods_command(args: argparse.Namespace) -> int:
             print(f"    {quality:<10} " + "  ".join(f"{key}={value}" for key, value in options.items()))
     print("auto\n  The method that the scene names, else the renderer's choice.")
     print("none\n  No caustics: direct light alone.")
+    print("with every method (--set)")
+    for option, meaning in OPTION_HELP.items():
+        print(f"    {option:<22} {meaning}")
     return 0

@@ -79,6 +79,15 @@ def _add_frame_options(command: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="buffers to deliver beside the picture ('all': every one); see render --list-aovs",
     )
+    command.add_argument(
+        "--set",
+        type=setting,
+        action="append",
+        default=[],
+        dest="settings",
+        metavar="KEY=VALUE",
+        help="an option that the quality ladder would choose, see methods; may be repeated",
+    )
 
 
 def _add_render_options(command: argparse.ArgumentParser) -> None:
@@ -91,15 +100,6 @@ def _add_render_options(command: argparse.ArgumentParser) -> None:
         action=argparse.BooleanOptionalAction,
         default=True,
         help="whether the eye sees specular objects; without, AOVs are those of the receivers behind them",
-    )
-    command.add_argument(
-        "--set",
-        type=setting,
-        action="append",
-        default=[],
-        dest="settings",
-        metavar="KEY=VALUE",
-        help="an option of the method that the quality ladder would choose, see methods; may be repeated",
     )
     command.add_argument(
         "--time", type=finite, default=0.0, metavar="T", help="time of the first frame, s (default: 0)"

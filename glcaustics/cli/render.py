@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import glcaustics
 from glcaustics import output
-from glcaustics.cli.choices import check_aovs, check_method
+from glcaustics.cli.choices import check_aovs, check_method, check_settings
 from glcaustics.errors import UsageError
 
 if TYPE_CHECKING:
@@ -93,16 +93,7 @@ def _check(args: argparse.Namespace, known_aovs: dict[str, str]) -> Job:
         output.check_writable(json_path)
         if json_path in paths:
             raise UsageError("is both the picture and the JSON file", where=args.json, remedy="name another file")
-    return Job(args, paths, json_path, aovs, _options(args.settings))
-
-
-def _options(settings: Iterable[tuple[str, Any]]) -> dict[str, Any]:
-    options: dict[str, Any] = {}
-    for key, value in settings:
-        if key in options:
-            raise UsageError(f"{key} is set twice", where="--set", remedy="keep one")
-        options[key] = value
-    return options
+    return Job(args, paths, json_path, aovs, check_settings(args.settings))
 
 
 def _render_frames(renderer: Renderer, job: Job) -> list[dict[str, Any]]:

@@ -26,8 +26,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
     """Puts fakes in the place of the registry and the planner; returns what the planner is asked."""
     calls: list[tuple[Any, ...]] = []
 
-    def plan_frame(scene: Any, *rest: Any) -> SimpleNamespace:
-        calls.append((scene.name, *rest))
+    def plan_frame(scene: Any, *rest: Any, options: dict[str, Any]) -> SimpleNamespace:
+        calls.append((scene.name, *rest, options))
         return SimpleNamespace(explain=lambda: "the table", to_dot=lambda: "digraph {}")
 
     for name, members in {
@@ -41,9 +41,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
 
 
 def test_plan_prints_the_table(asked: list[Any], capsys: pytest.CaptureFixture[str]) -> None:
-    argv = "plan peer-pool --size 64x32 --method caustic_map --quality high --aov depth_m"
+    argv = "plan peer-pool --size 64x32 --method caustic_map --quality high --aov depth_m --set depth_layers=2"
     assert cli.main(argv.split()) == 0
-    assert asked == [("peer-pool", (64, 32), "caustic_map", "high", ("depth_m",))]
+    assert asked == [("peer-pool", (64, 32), "caustic_map", "high", ("depth_m",), {"depth_layers": 2})]
     assert capsys.readouterr().out == "the table\n"
 
 
@@ -63,6 +63,15 @@ def test_methods_names_paper_and_ladder(asked: list[Any], capsys: pytest.Capture
     out = capsys.readouterr().out
     assert "Shah, Konttinen, Pattanaik 2007" in out
     assert "medium     map_size=512  estimate=hybrid" in out
+    assert re.search(r"^ +depth_layers +2: eye rays that end behind", out, re.MULTILINE)
+
+
+def test_every_option_of_the_frame_has_its_help() -> None:
+    from glcaustics.passes.options import OPTION_HELP
+    from glcaustics.renderer import BASE_LADDER
+
+    for options in BASE_LADDER.values():
+        assert set(options) == set(OPTION_HELP)
 
 
 def test_scenes_lists_every_built_in_scene_with_its_licence(capsys: pytest.CaptureFixture[str]) -> None:
