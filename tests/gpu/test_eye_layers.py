@@ -19,6 +19,7 @@ from glcaustics.passes.geometry import GpuScene, boxes_of
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.renderer import Frame, plan_frame, resolve_options
 from glcaustics.scene.model import Camera, Image, Instance, Material, Scene
+from glcaustics.scene.transform import scaled
 from tests.gpu.feature_scenes import BACKEND, GLASS, WHITE, box, from_above, plane, scene_of, sheet, sun, translation
 from tests.gpu.physics_meshes import grid_triangles, make_mesh
 
@@ -229,3 +230,22 @@ def test_built_only_where_asked() -> None:
     assert not extra & {step.name for step in unread.steps}
     with pytest.raises(UsageError, match="option depth_layers is 3"):
         plan_frame(scene, SIZE, options={"depth_layers": 3})
+
+
+@pytest.mark.parametrize("change", ["orthographic", "small", "large"])
+def test_second_layer_for_other_cameras_and_scales(change: str) -> None:
+    """An orthographic camera; and the same scene a thousand times smaller or larger, pixel by pixel."""
+
+    def scene(*, block: bool) -> Scene:
+        made = over_the_block(block=block)
+        if change == "orthographic":
+            return replace(made, camera=replace(made.camera, orthographic=True, ymag_m=0.9))
+        return scaled(made, 1e-3 if change == "small" else 1e3)
+
+    bare, two = render(scene(block=False), 1).image, render(scene(block=True), 2)
+    second = two.aov["solve_status"] == SECOND
+    if change != "orthographic":
+        there = render(over_the_block(block=True), 2).aov["solve_status"] == SECOND
+        assert (second != there).sum() <= 0.02 * there.sum()
+    error = np.abs(two.image - bare).mean(axis=2)[second] / bare.mean()
+    assert second.sum() > 150 and error.mean() < 0.005 and np.median(error) < 1e-4
