@@ -80,6 +80,9 @@ bool photon_is_seen(vec3 p, vec3 normal_ws, vec3 d, float slack_m, inout PhotonL
             landing.status = PHOTON_BY_LIGHT_VIEW;
             return true;
         }
+        // A pixel whose centre shows what lies behind an edge gets all photons behind it, those that the edge hides too. With those beyond
+        // the edge from the pixels beside it there would be a bright rim. Behind by little it is the other face of a convex edge.
+        if (k == 0 && gap < -2.0 * tolerance) return false;
         if (k == 0 && gap > 0.0) landing.status = 0;
     }
     return false;
