@@ -6,12 +6,14 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from glcaustics.caustics.method import CausticsMethod
 from glcaustics.passes.geometry import SPECULAR_KINDS
 from glcaustics.scene.model import Instance, Light, LightKind, Material
 
 FOLLOWED_BY = "photon_trace"
-DIRECT, EYE = "direct light", "the eye's rays"
+DIRECT, EYE, ENCLOSED = "direct light", "the eye's rays", "what lies within its sphere"
 
 
 def ignored_parts(
@@ -30,12 +32,22 @@ def ignored_parts(
         if light.shines and light.has_size:
             what, value = light_size(light)
             rows += [{"what": what, "of": light.name, "value": value, "by": who} for who in (*blind, DIRECT)]
+            if not blind and method is not None and _encloses(light, specular):
+                rows.append({"what": what, "of": light.name, "value": value, "by": ENCLOSED})
     materials: dict[int, Material] = {id(i.material): i.material for i in specular if i.material.roughness > 0.0}
     for material in materials.values():
         value = float(material.roughness)
         for who in (*blind, *((EYE,) if specular_view else ())):
             rows.append({"what": "roughness", "of": material.name, "value": value, "by": who})
     return rows
+
+
+def _encloses(light: Light, specular: Iterable[Instance]) -> bool:
+    """Whether a vertex lies within the light's sphere, where its light is not defined."""
+    if light.kind is LightKind.DIRECTIONAL:
+        return False
+    centre, radius_m = np.asarray(light.position_ws, np.float64), light.radius_m
+    return any(bool((((i.positions_ws() - centre) ** 2).sum(axis=1) < radius_m**2).any()) for i in specular)
 
 
 def light_size(light: Light) -> tuple[str, float]:
@@ -53,6 +65,11 @@ def ignored_words(rows: Iterable[dict[str, Any]]) -> list[str]:
     lines = []
     for (who, is_rough), members in groups.items():
         names = ", ".join(f"'{row['of']}' ({row['what']} {row['value']:.3g})" for row in members)
+        if who == ENCLOSED:
+            lines.append(
+                f"specular surfaces lie within the sphere of {names}: the light that falls on them is not exact"
+            )
+            continue
         taken = "as smooth" if is_rough else "as a point: its shadows are hard" if who == DIRECT else "as a point"
         remedy = "" if who in (DIRECT, EYE) else f"; method {FOLLOWED_BY} follows it"
         lines.append(f"{who} {'take' if who == EYE else 'takes'} {names} {taken}{remedy}")

@@ -89,6 +89,14 @@ def test_a_glowing_sphere_through_flat_water() -> None:
     check(image, beams.mean[..., 1], frame)
 
 
+def test_a_spot_with_a_radius_keeps_its_flux() -> None:
+    """Its cone is that of its centre, so that nothing is lost at the rim."""
+    spot = Light(LightKind.SPOT, intensity=10.0, position_ws=(0, 1.2, 0), inner_cone_rad=0.2, outer_cone_rad=0.6)
+    sharp, soft = (photons(under_water(replace(spot, radius_m=r)), 24, frames=1, photons=60_000)[0] for r in (0.0, 0.3))
+    assert soft.sum() == pytest.approx(sharp.sum(), rel=2e-3)
+    assert (soft > 0.01 * soft.max()).sum() > (sharp > 0.01 * sharp.max()).sum()
+
+
 def test_rough_water_spreads_light_as_walters_formula_says() -> None:
     slanted = math.degrees(math.atan(0.5))
     scene = under_water(sun(slanted), 0.5, 0.2)

@@ -47,7 +47,7 @@ def test_each_part_is_named_once_with_who_ignores_it() -> None:
 
 
 def test_a_method_that_follows_both_is_not_among_them() -> None:
-    ring = Instance("a", MESH, STEEL)
+    ring = Instance("a", replace(MESH, positions_m=np.ones((3, 3))), STEEL)
     rows = ignored_parts([FLOOR, ring], [LAMP], PhotonTrace, specular_view=False)
     assert [(r["what"], r["by"]) for r in rows] == [("radius_m", "direct light")]
 
@@ -57,3 +57,9 @@ def test_without_specular_surfaces_there_are_no_caustics_to_be_sharp() -> None:
         [FLOOR], [LAMP, Light(LightKind.POINT, "off", intensity=0.0, radius_m=1.0)], CausticMap, specular_view=True
     )
     assert [(r["of"], r["by"]) for r in rows] == [("lamp", "direct light")]
+
+
+def test_a_lamp_that_encloses_a_specular_surface_is_announced() -> None:
+    rows = ignored_parts([Instance("a", MESH, STEEL)], [LAMP], PhotonTrace, specular_view=False)
+    assert [r["by"] for r in rows] == ["direct light", "what lies within its sphere"], "MESH lies at the lamp's centre"
+    assert "within the sphere of 'lamp' (radius_m 0.05)" in ignored_words(rows)[1]
