@@ -64,6 +64,11 @@ def solve_cost(costs: Mapping[str, Mapping[str, float]], solver: str) -> float |
     return None if first is None or base is None else max(first - base, 0.0)
 
 
+def cost_ms(row: Row) -> float:
+    """Milliseconds that a row's image took: one frame's, times its frames."""
+    return float(row["time_ms"]["median"]) * int(row.get("frames", 1))
+
+
 def row_id(row: Row) -> str:
     """What makes two rows of two reports the same measurement."""
     parts = [row["scene"], row["tool"], row["method"], row["quality"], f"{row['pixels']}px"]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from glcaustics.bench.analysis import fit_power, pareto
+from glcaustics.bench.analysis import cost_ms, fit_power, pareto
 from glcaustics.bench.cells import Cells
 from glcaustics.bench.equal_error import equal_error
 from glcaustics.bench.luxcore_peer import SCENES as LUXCORE_SCENES
@@ -22,6 +22,7 @@ from glcaustics.bench.references import beam_reference
 from glcaustics.bench.scaling import samples_option, scaling_cases
 from glcaustics.bench.store import Arrays, scene_key
 from glcaustics.bench.targets import Target, bench_scene, target_of
+from glcaustics.caustics.registry import METHODS
 from glcaustics.errors import UsageError
 from glcaustics.scene.model import Scene
 
@@ -100,13 +101,16 @@ class CausticsPart:
             small = reduced(truth, size)
             for quality in self.plan.qualities:
                 for method in ("none", *self.plan.methods):
-                    case = Case(scene, target, method, quality, size, self.plan.backend)
+                    frames = self.plan.frames if method in METHODS and METHODS[method].noisy else 1
+                    case = Case(scene, target, method, quality, size, self.plan.backend, frames=frames)
                     self._ours(case, small)
 
     def _ours(self, case: Case, truth: Halves | None) -> dict[str, Any]:
         label = f"{case.scene.name}: {case.method} {case.quality} {case.pixels}^2"
         timing = vars(self.plan.timing)
-        key = self.cells.key(scene_key(case.scene), case.method, case.quality, case.pixels, case.options, timing)
+        key = self.cells.key(
+            scene_key(case.scene), case.method, case.quality, case.pixels, case.options, timing, case.frames
+        )
 
         def make() -> tuple[dict[str, Any], Arrays]:
             row, image = measure(case, self.plan.timing)
@@ -207,7 +211,7 @@ class CausticsPart:
         for row in self.rows:
             if row["pixels"] == self.plan.largest and row["errors"].get("rrmse"):
                 key = (row["scene"], row["tool"], row["method"])
-                groups.setdefault(key, []).append((row["time_ms"]["median"], row["errors"]["rrmse"]))
+                groups.setdefault(key, []).append((cost_ms(row), row["errors"]["rrmse"]))
         return [
             {"what": "error against time", "scene": scene, "tool": tool, "method": method, "points": sorted(points)}
             | {"fit": fit_power(*zip(*points, strict=True))}
@@ -219,7 +223,7 @@ class CausticsPart:
         for name in self.plan.scenes:
             rows = [r for r in self.rows if r["scene"] == name and r["pixels"] == self.plan.largest]
             rows = [r for r in rows if r["errors"].get("rrmse")]
-            points = [(r["time_ms"]["median"], r["errors"]["rrmse"]) for r in rows]
+            points = [(cost_ms(r), r["errors"]["rrmse"]) for r in rows]
             front = [{k: rows[i][k] for k in ("tool", "method", "quality")} for i in pareto(points)]
             fronts.append({"scene": name, "front": front})
         return fronts

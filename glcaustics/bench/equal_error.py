@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from glcaustics.bench.analysis import Row, caustics_ms, cost_at_error, fit_power
+from glcaustics.bench.analysis import Row, cost_at_error, cost_ms, fit_power
 
 PTRACER, DENOISED = "ptracer", "ptracer+oidn"
 
@@ -99,7 +99,7 @@ def compare(error: float, time_ms: float, raw: Sequence[Row], clean: Sequence[Ro
 def equal_error(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """One entry for each of our rows with an error that has a peer at the same scene and size.
 
-    `ms` is the whole frame; `caustics_ms` what caustics add to it, with the ratio `ratio_caustics` beside.
+    `ms` is of the whole frame, of all frames for an image that took several.
     """
     found = []
     for row in rows:
@@ -110,9 +110,9 @@ def equal_error(rows: Sequence[Row]) -> list[dict[str, Any]]:
         raw, clean = ([r for r in same if r["method"] == name] for name in (PTRACER, DENOISED))
         if not raw:
             continue
-        entry = compare(error, row["time_ms"]["median"], raw, clean)
+        entry = compare(error, cost_ms(row), raw, clean)
         entry |= {name: row[name] for name in ("scene", "method", "quality", "pixels")}
-        found.append(entry | {"caustics_ms": caustics_ms(rows, row)})
+        found.append(entry)
     return found
 
 

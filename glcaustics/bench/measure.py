@@ -45,7 +45,7 @@ class Timing:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What is rendered. `options`: on top of the quality's."""
+    """What is rendered. `options`: on top of the quality's. `frames`: of a still, of which the last one is judged."""
 
     scene: Scene
     target: Target
@@ -54,6 +54,7 @@ class Case:
     pixels: int
     backend: str = "auto"
     options: Mapping[str, Any] = field(default_factory=dict)
+    frames: int = 1
 
 
 def summary(values: list[float], kind: str) -> dict[str, Any]:
@@ -79,7 +80,8 @@ def measure(case: Case, timing: Timing) -> tuple[dict[str, Any], FloatArray]:
     """A row of the report without its errors, and the irradiance (P, P), luminance, at the target.
 
     The first frame (set-up, shader compilation) is a warm-up and told apart. On a software renderer a frame's time is
-    the wall clock up to `finish`; on a GPU the sum of its passes' timer queries.
+    the wall clock up to `finish`; on a GPU the sum of its passes' timer queries. `time_ms` is of one frame: the image
+    has taken `frames` of them.
     """
     scene = replace(case.scene, camera=case.target.camera(), camera_at=None)
     options = {**same_paths(case), **case.options}
@@ -96,11 +98,15 @@ def measure(case: Case, timing: Timing) -> tuple[dict[str, Any], FloatArray]:
         keep=False,
     )
     with renderer:
-        renderer.render()
-        first_ms = 1e3 * (time.perf_counter() - begin)
-        values = timing.run(lambda: frame_ms(renderer))
         frame = renderer.render()
-        stats, device = frame.stats, renderer.device
+        first_ms = 1e3 * (time.perf_counter() - begin)
+        if case.frames > 1:
+            for _ in range(case.frames - 2):
+                renderer.draw()
+            frame = renderer.render()
+        image = luminance(frame.aov["caustic_irradiance"])
+        values = timing.run(lambda: frame_ms(renderer))
+        stats, device = renderer.render().stats, renderer.device
         row = {
             "scene": scene.name,
             "tool": "glcaustics",
@@ -109,6 +115,7 @@ def measure(case: Case, timing: Timing) -> tuple[dict[str, Any], FloatArray]:
             "pixels": case.pixels,
             "options": dict(renderer.options),
             "overrides": dict(case.options),
+            "frames": case.frames,
             "time_ms": summary(values, device.timer_kind),
             "first_frame_ms": first_ms,
             "passes": stats["passes"],
@@ -120,7 +127,7 @@ def measure(case: Case, timing: Timing) -> tuple[dict[str, Any], FloatArray]:
             "backend": device.backend,
             "gl_renderer": device.info["renderer"],
         }
-        return row, luminance(frame.aov["caustic_irradiance"])
+        return row, image
 
 
 def picture(

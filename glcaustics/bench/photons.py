@@ -107,13 +107,12 @@ def stage_table(
                         renderer.device.make_current()
                         renderer.draw()
                         timings = renderer.device.finish_timings()
-                        if number > 0:  # the first frame compiles
-                            for stage, value in stages_of(timings).items():
-                                samples[march].setdefault(stage, []).append(value)
+                        if number == 0:  # compiles; later photons follow what those before them brought
+                            landings[march] = _landings(renderer)
+                            continue
+                        for stage, value in stages_of(timings).items():
+                            samples[march].setdefault(stage, []).append(value)
                 clock = "processor time" if ours.device.is_software else ours.device.timer_kind
-                for march, renderer in both.items():
-                    renderer.device.make_current()
-                    landings[march] = _landings(renderer)
                 theirs.device.make_current()
             ours.device.make_current()
         for march in MARCHES:
@@ -143,7 +142,7 @@ def stages_of(timings: Mapping[str, float]) -> dict[str, float]:
 
 
 def _landings(renderer: Renderer) -> list[FloatArray]:
-    """(H, W, 4) of each kind of path: pixel, inverse area, status of every photon of the last frame."""
+    """(H, W, 4) of each kind of path: pixel, inverse area, status of every photon of the frame before."""
     runner = renderer._runner
     assert runner is not None
     found = []

@@ -81,7 +81,7 @@ class MeshPlan:
 class Plan:
     """What is measured. `sizes`: pixels a side, each a divisor of the largest; `photons`: of the peers;
     `validate`: photons of each Mitsuba half that the beams are held against, 0 = not; `seconds`: given to LuxCore;
-    `parts`: of PARTS."""
+    `parts`: of PARTS; `frames`: of a still that a noisy method gets before it is judged."""
 
     scenes: tuple[str, ...]
     methods: tuple[str, ...]
@@ -96,6 +96,7 @@ class Plan:
     quick: bool = False
     seconds: tuple[float, ...] = (1.0, 4.0, 16.0)
     parts: tuple[str, ...] = tuple(PARTS)
+    frames: int = 16
     photon: PhotonPlan = field(default_factory=PhotonPlan)
     eye: EyePlan = field(default_factory=EyePlan)
     seen: SeenPlan = field(default_factory=SeenPlan)
@@ -119,14 +120,15 @@ FULL = Plan(
 QUICK = replace(
     FULL,
     scenes=("pool", "peer-pool", "glass-sphere", "metal-ring"),
-    qualities=("draft", "low", "medium"),
+    qualities=("draft", "medium"),
     sizes=(128,),
     photons=(1 << 15, 1 << 17, 1 << 19),
     validate=1 << 19,
     cells=320,
-    timing=Timing(3, 30, 0.5),
+    timing=Timing(3, 30, 0.3),
     quick=True,
     seconds=(1.0, 4.0),
+    frames=8,
     photon=PhotonPlan(
         side=256,
         view_size=768,

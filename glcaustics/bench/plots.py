@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from glcaustics.bench.analysis import fit_power, pareto
+from glcaustics.bench.analysis import cost_ms, fit_power, pareto
 from glcaustics.bench.plots_parts import part_plots
 from glcaustics.bench.plots_tools import COLORS, MARKERS, log_axes, to_png
 from glcaustics.errors import UsageError
@@ -66,17 +66,17 @@ def _error_against_time(report: Report, scene: str) -> bytes:
     clock = next((r["time_ms"]["clock"] for r in rows if r["tool"] == "glcaustics"), "wall clock")
     pixels = rows[0]["pixels"] if rows else 0
     figure, axes = log_axes(
-        f"{scene}, {pixels} x {pixels}", f"time of a frame, ms ({clock})", "relative RMSE of irradiance"
+        f"{scene}, {pixels} x {pixels}", f"time of the image, ms ({clock})", "relative RMSE of irradiance"
     )
-    points = [(r["time_ms"]["median"], r["errors"]["rrmse"]) for r in rows]
+    points = [(cost_ms(r), r["errors"]["rrmse"]) for r in rows]
     for name in tools(report):
         mine = [(p, r) for p, r in zip(points, rows, strict=True) if (r["tool"], r["method"]) == name]
         mine.sort(key=lambda item: item[0])
         if not mine:
             continue
         x, y = zip(*(p for p, _ in mine), strict=True)
-        low = [p[0] - r["time_ms"]["min"] for p, r in mine]
-        high = [r["time_ms"]["max"] - p[0] for p, r in mine]
+        low = [p[0] - r["time_ms"]["min"] * r.get("frames", 1) for p, r in mine]
+        high = [r["time_ms"]["max"] * r.get("frames", 1) - p[0] for p, r in mine]
         style = _style(report, name)
         axes.plot(x, y, markersize=5, linewidth=1.4, **style)
         axes.errorbar(x, y, xerr=(low, high), fmt="none", ecolor=style["color"], elinewidth=0.8, alpha=0.6)

@@ -51,12 +51,18 @@ def table(report: Mapping[str, Any]) -> str:
         cells += [f"{row['time_ms']['median']:.0f}", _number(own, ".0f"), *peers]
         lines.append("| " + " | ".join(cells) + " |")
     state = report["machine"]
+    several = max((r.get("frames", 1) for r in rows), default=1)
+    still = (
+        f" Noisy methods: error after {several} frames of a still, which all count for the ratio."
+        if several > 1
+        else ""
+    )
     commit = str(report["commit"] or "no checkout")[:10] + (" with changes" if report["dirty"] else "")
     clock = next(r["time_ms"]["clock"] for r in rows if r["tool"] == "glcaustics")
     lines += [
         "",
         f"Irradiance at {pixels}x{pixels} of each scene's target; {state['gl_renderer']} by {clock}, {state['cpu']}, "
-        f"{state['cores']} cores; commit {commit}; `{report['command']}`.",
+        f"{state['cores']} cores; commit {commit}; `{report['command']}`.{still}",
     ]
     return "\n".join(lines)
 

@@ -64,19 +64,20 @@ def target_of(scene: str) -> Target:
 
 
 def bench_scene(name: str) -> Scene:
-    """The scene that every tool gets: water at rest at time 0, media clear.
+    """The scene that every tool gets: water at rest at time 0, media clear, surfaces smooth.
 
-    Absorption is left out, since Mitsuba's `ptracer` knows no media; our own tests hold it against closed forms.
+    Absorption is left out, since Mitsuba's `ptracer` knows no media, and roughness, which not every method follows; our
+    own tests hold both.
     """
     scene = load_scene(name)
     instances = tuple(
-        replace(i, material=_clear(i.material)) if i.optical_kind in SPECULAR else i for i in scene.instances_at(0.0)
+        replace(i, material=_plain(i.material)) if i.optical_kind in SPECULAR else i for i in scene.instances_at(0.0)
     )
     return replace(scene, instances=instances, waters=(), camera_at=None)
 
 
-def _clear(material: Material) -> Material:
-    return replace(material, attenuation_color=(1.0, 1.0, 1.0), attenuation_distance_m=math.inf)
+def _plain(material: Material) -> Material:
+    return replace(material, attenuation_color=(1.0, 1.0, 1.0), attenuation_distance_m=math.inf, roughness=0.0)
 
 
 def casters(scene: Scene) -> list[Instance]:

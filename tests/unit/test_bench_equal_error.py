@@ -75,6 +75,11 @@ def test_the_ratio_is_of_whole_frames_and_told_in_words() -> None:
     assert equal_error([ours(0.01, 40.0, pixels=32), *RAW]) == [], "other sizes are not compared"
 
 
+def test_all_frames_of_a_still_count() -> None:
+    one, eight = (equal_error([ours(0.01, 40.0, frames=n), *RAW])[0] for n in (1, 8))
+    assert eight["ms"] == 320.0 and one["ptracer"]["ratio"] == pytest.approx(8.0 * eight["ptracer"]["ratio"])
+
+
 def test_marks_are_judged_and_listed() -> None:
     for ms, met in ((30.0, True), (300.0, False)):
         report = {"equal_error": equal_error([ours(0.01, ms), *RAW])}
