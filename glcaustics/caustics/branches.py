@@ -21,6 +21,7 @@ STATUS_WORDS = {  # negative values in landing.w; see solve.frag
     -6: "normal_faces_away",
     -7: "met_another_specular_surface",
 }
+NO_EXIT = -4
 LEFT = -8  # out of the scene: not lost, there is nothing to land on
 CONVERGED, BRACKETED = 1, 2
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from glcaustics.caustics.branches import branches_of, read_rgba32f
+from glcaustics.caustics.branches import NO_EXIT, SOLID, branches_of, read_rgba32f
 from glcaustics.caustics.map_warp import MapWarp, fit_warp
 from glcaustics.gpu import Device
 from glcaustics.graph import FrameGraph
@@ -121,7 +121,7 @@ def _coarse_solve(
     points: dict[str, list[FloatArray]] = {}
     weights: dict[str, list[FloatArray]] = {}
     shares: dict[str, float] = {}
-    tried_flux = 0.0
+    tried_flux, solid_flux, trapped_flux = 0.0, 0.0, 0.0
     try:
         runner.run(frame)
         for branch in branches:
@@ -132,8 +132,12 @@ def _coarse_solve(
             weights.setdefault(branch.view, []).append(flux[ok])
             shares[branch.kind] = shares.get(branch.kind, 0.0) + float(flux[ok].sum())
             tried_flux += float(flux.sum())
+            if branch.kind == SOLID:
+                solid_flux += float(flux.sum())
+                trapped_flux += float(flux[landing[..., 3] == NO_EXIT].sum())
     finally:
         runner.release()
+    method.regard_trapped(light, trapped_flux / max(solid_flux, 1e-300))
     landed = {name: (np.concatenate(points[name]), np.concatenate(weights[name])) for name in points}
     return landed, {kind: flux / max(tried_flux, 1e-300) for kind, flux in shares.items()}
 

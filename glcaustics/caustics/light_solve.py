@@ -29,6 +29,7 @@ from glcaustics.scene.model import OpticalKind
 SHADERS = "caustics/shared"
 ESTIMATES = {"fixed_point": 0, "newton_fd": 1, "hybrid": 2}
 NEGLIGIBLE_SHARE = 5e-4  # a branch that brings less of a light's flux to the receivers is left out, and said so
+TRAPPED_SHARE = 0.01  # of the light in solids: from there on a second pair of their layers is drawn
 CORE_TAPS = 32  # on each side of a pixel: few pixels see a core, and those few may each see many of its texels
 SPLAT_SIGMA = 0.62  # of the distance to the neighbour: least blur at which a regular grid of splats is flat to 0.2 %
 
@@ -73,6 +74,8 @@ class LightMapMethod(CausticsMethod):
     def __init__(self) -> None:
         self._branches: dict[int, list[Branch]] = {}
         self._warps: dict[tuple[int, str], MapWarp] = {}
+        self._trapped: dict[int, float] = {}
+        self._layered: set[int] = set()
         self._left_out: list[tuple[str, str]] = []
 
     @classmethod
@@ -164,6 +167,16 @@ class LightMapMethod(CausticsMethod):
         """The branches that this light needs."""
         return self._branches.get(light.index, branches_of(setup, light, self.name))
 
+    def layers(self, light: LightSetup) -> int:
+        """Pairs of front and back faces by which this light's way through solids is followed: 1, or 2."""
+        return 2 if light.index in self._layered else 1
+
+    def regard_trapped(self, light: LightSetup, share: float) -> None:
+        """`share`: of the flux in solids that finds no way out by one pair; above `TRAPPED_SHARE`, two are drawn."""
+        self._trapped[light.index] = share
+        if share > TRAPPED_SHARE:
+            self._layered.add(light.index)
+
     def leave_out(self, graph: FrameGraph, setup: FrameSetup, because: str) -> None:
         for light in setup.lights:
             for name in ("caster_view", "receiver_view", f"{self.name}.solve", f"{self.name}.map"):
@@ -221,6 +234,12 @@ class LightMapMethod(CausticsMethod):
                 light_view.declare_receiver(graph, setup, light, receiver)
         if OpticalKind.SOLID in setup.kinds():
             light_view.declare_caster_back(graph, setup, light)
+            if self.layers(light) == 2:
+                light_view.declare_caster_layers(graph, light)
+            else:
+                share = 100.0 * self._trapped.get(light.index, 0.0)
+                because = f"{share:.2g} % of the light in solids finds no way out without a second pair of layers"
+                graph.leave_out(f"caster_front2{light.resource('')}", because)
         else:
             graph.leave_out(f"caster_back{light.resource('')}", "nothing in the scene is a solid with two interfaces")
         for branch in branches:
@@ -229,7 +248,8 @@ class LightMapMethod(CausticsMethod):
     def _declare_solve(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, branch: Branch) -> None:
         assert light.caster is not None
         size = light.caster.size
-        back = (light.resource("caster.back_position_ws"), light.resource("caster.back_normal_ws"))
+        behind = ("back", "front2", "back2") if self.layers(light) == 2 else ("back",)
+        back = tuple(light.resource(f"caster.{n}_{what}") for n in behind for what in ("position_ws", "normal_ws"))
         graph.add(
             PassDecl(
                 branch.pass_name("solve"),
@@ -258,6 +278,7 @@ class LightMapMethod(CausticsMethod):
                 "CASTER_FACES": light.caster.faces,
                 "RECEIVER_FACES": view.faces,
                 "BRANCH": BRANCH_CODE[branch.kind],
+                "LAYERS": self.layers(light) if branch.kind == SOLID else 1,
                 "HAS_MIRROR": int(branch.kind == REFLECT and OpticalKind.MIRROR in ctx.setup.kinds()),
                 "NAIVE_FLUX": int(options.get("naive_flux", False)),
                 "ESTIMATE": ESTIMATES[options["estimate"]],
@@ -270,7 +291,8 @@ class LightMapMethod(CausticsMethod):
             "t_receiver_normal": f"receiver.{branch.view}.normal_ws",
         }
         if branch.kind == SOLID:
-            textures |= {"t_back_position": "caster.back_position_ws", "t_back_normal": "caster.back_normal_ws"}
+            for name in ("back", "front2", "back2") if self.layers(light) == 2 else ("back",):
+                textures |= {f"t_{name}_{n}": f"caster.{name}_{n}_ws" for n in ("position", "normal")}
             solids = [item.bounds_ws for item in ctx.frame.gpu.select(OpticalKind.SOLID)]
             program.set_all(
                 {

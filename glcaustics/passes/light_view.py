@@ -55,35 +55,47 @@ def _draw_caster(ctx: PassContext, light: LightSetup, position: str, normal: str
 def declare_caster_back(graph: FrameGraph, setup: FrameSetup, light: LightSetup) -> None:
     """The first back face behind each solid's front (Wyman 2005), for its second interface."""
     assert light.caster is not None
+    _declare_behind(graph, light, "back", "caster.position_ws", "front", "back faces of solids seen from the light")
+
+
+def declare_caster_layers(graph: FrameGraph, light: LightSetup) -> None:
+    """The second front face behind the first back face of the same solid, and the back face behind that (depth peeling,
+    Everitt 2001): what a solid with folds or handles shows the light a second time."""
+    _declare_behind(graph, light, "front2", "caster.back_position_ws", "back", "solids behind their own first layer")
+    _declare_behind(graph, light, "back2", "caster.front2_position_ws", "front", "where that layer ends")
+
+
+def _declare_behind(graph: FrameGraph, light: LightSetup, name: str, before: str, cull: str, note: str) -> None:
+    """The first faces of each texel's solid behind what is in `before`; `cull`: the faces that do not count."""
+    assert light.caster is not None
     size = light.caster.size
-    front = light.resource("caster.position_ws")
-    position, normal, depth = (
-        light.resource(f"caster.{n}") for n in ("back_position_ws", "back_normal_ws", "back_depth")
-    )
+    front = light.resource(before)
+    position, normal, depth = (light.resource(f"caster.{name}_{n}") for n in ("position_ws", "normal_ws", "depth"))
     graph.add(
         PassDecl(
-            f"caster_back{light.resource('')}",
+            f"caster_{name}{light.resource('')}",
             {
                 position: TextureDesc("rgba32f", size, "m"),
                 normal: TextureDesc("rgba32f", size, filter="linear"),
                 depth: TextureDesc("depth24", size),
             },
-            lambda ctx: _draw_back(ctx, light, front, position, normal, depth),
+            lambda ctx: _draw_behind(ctx, light, front, (position, normal, depth), cull),
             reads=(front,),
             always_writes=(depth,),
-            note="back faces of solids seen from the light",
+            note=note,
         )
     )
 
 
-def _draw_back(ctx: PassContext, light: LightSetup, front: str, position: str, normal: str, depth: str) -> None:
+def _draw_behind(ctx: PassContext, light: LightSetup, front: str, names: tuple[str, str, str], cull: str) -> None:
     assert light.caster is not None
+    position, normal, depth = names
     target = ctx.target(position, normal, depth=depth)
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
     outputs = {**ctx.locations(POSITION=position, NORMAL=normal), "HAS_PLANE": 0}
     program = ctx.device.program(SHADER, {**outputs, "BACK": 1, "OCCLUDER": 0, "CLIP": 0})
     program.set(t_front_position=ctx.texture(front), u_light=light.caster.light_vec4)
-    _draw_kind(ctx, light.caster, program, target, ctx.frame.gpu.select(OpticalKind.SOLID), cull="front")
+    _draw_kind(ctx, light.caster, program, target, ctx.frame.gpu.select(OpticalKind.SOLID), cull=cull)
 
 
 def declare_receiver(graph: FrameGraph, setup: FrameSetup, light: LightSetup, receiver: ReceiverView) -> None:

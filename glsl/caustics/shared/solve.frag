@@ -22,6 +22,9 @@ uniform sampler2D t_receiver_normal;
 uniform sampler2D t_back_position;
 uniform sampler2D t_back_normal;
 #endif
+#if LAYERS == 2
+#include "caustics/shared/solid_layers.glsl"
+#endif
 uniform vec3 u_bounds_min_ws;      // box around all receivers
 uniform vec3 u_bounds_max_ws;
 #if BRANCH == GLC_IN_AND_OUT
@@ -96,9 +99,14 @@ void main() {
     flux *= transmitted_share;
     bool in_absorber = object.kind == GLC_INTERFACE && !from_dense;
 #if BRANCH == GLC_IN_AND_OUT
+#if LAYERS == 2
+    int lost = pass_layers(caster_view, caster.w, u_caster_min_ws, u_caster_max_ws, object.sigma_a, ior, ESTIMATE, u_max_iterations,
+                           u_march_steps, u_internal_bounces, p, ray, flux, iterations);
+#else
     int lost = glc_pass_solid(t_caster_position, t_caster_normal, t_back_position, t_back_normal, caster_view, u_caster_min_ws,
                               u_caster_max_ws, object.sigma_a, ior, ESTIMATE, u_max_iterations, u_march_steps, u_internal_bounces,
                               p, ray, flux, iterations);
+#endif
     if (lost != 0) { o_landing.w = float(lost); o_flux = vec4(flux, iterations); return; }
 #endif
 #endif

@@ -1,0 +1,124 @@
+// A ray's way through a solid of many layers (folds, handles, cavities): `glc_pass_solid` for two pairs of front and back faces, the
+// second one peeled from behind the first (Everitt 2001, "Interactive order-independent transparency"). What is inside of
+// neither pair is taken for outside; a solid with more layers still loses light there, and it is counted.
+#include "common/solid_path.glsl"
+
+uniform sampler2D t_front2_position;
+uniform sampler2D t_front2_normal;
+uniform sampler2D t_back2_position;
+uniform sampler2D t_back2_normal;
+
+struct Layers {
+    bool inside;       // of one of the pairs
+    int nearest;       // face that is nearest along the light: 0 front, 1 back, 2 second front, 3 second back; -1: nothing here
+    vec3 surface_ws;   // of that face
+    ivec2 texel;
+};
+
+// `object`: its number + 1, since the pairs of a texel may be another solid's.
+Layers layers_at(GlcView view, vec3 p_ws, float object) {
+    vec3 projected = glc_view_project(view, p_ws);
+    Layers layers = Layers(false, -1, p_ws, ivec2(projected.xy));
+    if (!glc_view_inside(view, projected)) return layers;
+    vec4 face[4];
+    face[0] = texelFetch(t_caster_position, layers.texel, 0);
+    face[1] = texelFetch(t_back_position, layers.texel, 0);
+    face[2] = texelFetch(t_front2_position, layers.texel, 0);
+    face[3] = texelFetch(t_back2_position, layers.texel, 0);
+    float here = glc_light_distance(view, p_ws), best = 0.0;
+    for (int k = 0; k < 4; k += 2) {
+        if (face[k].w != object || face[k + 1].w != object) continue;
+        vec2 gap = vec2(glc_light_distance(view, face[k].xyz), glc_light_distance(view, face[k + 1].xyz)) - here;
+        if (gap.x <= 0.0 && gap.y >= 0.0) layers.inside = true;
+        for (int i = 0; i < 2; ++i)
+            if (layers.nearest < 0 || abs(gap[i]) < best) {
+                best = abs(gap[i]);
+                layers.nearest = k + i;
+                layers.surface_ws = face[k + i].xyz;
+            }
+    }
+    return layers;
+}
+
+vec3 layer_normal(Layers at, vec2 uv, vec3 otherwise) {
+    vec4 n = at.nearest == 0 ? texelFetch(t_caster_normal, at.texel, 0) : at.nearest == 1 ? texelFetch(t_back_normal, at.texel, 0)
+           : at.nearest == 2 ? texelFetch(t_front2_normal, at.texel, 0) : texelFetch(t_back2_normal, at.texel, 0);
+    vec3 at_texel = glc_safe_normalize(n.xyz, otherwise);
+    if ((at.nearest & 1) == 0) return at_texel;
+    // Between texels of one face the stored normals are interpolated, not between those of two.
+    vec3 between = at.nearest == 1 ? textureLod(t_back_normal, uv, 0.0).xyz : textureLod(t_back2_normal, uv, 0.0).xyz;
+    between = glc_safe_normalize(between, at_texel);
+    return dot(between, at_texel) > 0.9 ? between : at_texel;
+}
+
+// The ray's point on the tangent plane of a face, if it lies beside its texel (as `glc_settle`).
+bool settle_on(GlcView view, Layers at, vec3 o, vec3 d, inout GlcHit hit) {
+    if (at.nearest < 0) return false;
+    vec3 n = layer_normal(at, (vec2(at.texel) + 0.5) / view.size, -d);
+    float d_n = dot(d, n);
+    float t = abs(d_n) > 1e-3 ? dot(at.surface_ws - o, n) / d_n : hit.t;
+    vec3 p = o + t * d, off = p - at.surface_ws, l = glc_light_direction(view, p);
+    if (t < 0.0 || length(off - l * dot(off, l)) > 2.0 * GLC_REACH * glc_texel_width(view, at.surface_ws)) return false;
+    hit.t = t;
+    hit.position_ws = p;
+    hit.normal_ws = layer_normal(at, glc_view_project(view, p).xy / view.size, n);
+    hit.status = GLC_BRACKETED;
+    return true;
+}
+
+// Where a ray inside the solid leaves it: the first end of a stretch inside that lies on a face.
+GlcHit leave_layers(GlcView view, float object, vec3 o, vec3 d, float t_max, int march_steps) {
+    GlcHit hit = GlcHit(0.0, o, -d, 0, GLC_LEFT);
+    t_max += 4.0 * glc_texel_width(view, o);
+    float t_in = 0.0;
+    bool entered = true;   // the ray starts on a face, from there inwards
+    for (int i = 1; i <= march_steps; ++i) {
+        float t = t_max * float(i) / float(march_steps);
+        hit.iterations += 4;
+        if (layers_at(view, o + t * d, object).inside) { t_in = t; entered = true; continue; }
+        if (!entered || i < 2) continue;  // the first step may still graze the surface that the ray comes from
+        float lo = t_in, hi = t;
+        for (int k = 0; k < 10; ++k) {
+            float mid = 0.5 * (lo + hi);
+            if (layers_at(view, o + mid * d, object).inside) lo = mid; else hi = mid;
+        }
+        hit.iterations += 40;
+        hit.t = hi;
+        if (settle_on(view, layers_at(view, o + lo * d, object), o, d, hit)) return hit;
+        if (settle_on(view, layers_at(view, o + hi * d, object), o, d, hit)) return hit;
+        entered = false;   // an edge between two layers, not a surface: still inside
+    }
+    return hit;
+}
+
+// As `glc_pass_solid`.
+int pass_layers(GlcView view, float object, vec3 box_min, vec3 box_max, vec3 sigma_a, float ior, int estimate, int max_iterations,
+                int march_steps, int bounces, inout vec3 p, inout vec3 ray, inout vec3 flux, inout float iterations) {
+    float t_max = glc_box_exit(p, ray, box_min, box_max);
+    GlcHit exit = glc_intersect(t_back_position, t_back_normal, view, p, ray, t_max, estimate, max_iterations, 0);
+    iterations += float(exit.iterations);
+    for (int bounce = 0; bounce <= bounces; ++bounce) {
+        bool first = exit.status > 0;
+        if (!first) {
+            exit = leave_layers(view, object, p, ray, t_max, march_steps);
+            iterations += float(exit.iterations);
+            if (exit.status <= 0) return GLC_NO_EXIT;
+        }
+        flux *= glc_transmittance(sigma_a, exit.t);
+        vec3 n = -exit.normal_ws;
+        if (first) n = -glc_safe_normalize(textureLod(t_back_normal, glc_view_project(view, exit.position_ws).xy / view.size, 0.0).xyz, exit.normal_ws);
+        if (dot(n, ray) > 0.0) n = -n;
+        float reflected_share = glc_fresnel_dielectric(-dot(n, ray), 1.0 / ior);
+        vec3 outside;
+        bool leaves = glc_refract(ray, n, 1.0 / ior, outside);
+        p = exit.position_ws;
+        ray = outside;
+        if (leaves) {
+            flux *= 1.0 - reflected_share;
+            return 0;
+        }
+        t_max = glc_box_exit(p, ray, box_min, box_max);
+        exit.status = 0;
+    }
+    return GLC_TIR;
+}
