@@ -71,8 +71,6 @@ def test_light_leaves_behind_another_layer(method: str, monkeypatch: pytest.Monk
     assert trapped(two) < 0.1 * trapped(one)
     assert core.sum() * 2.0 * HALF / PIXELS > 0.1
     assert median == pytest.approx(expected, rel=0.01)
-        expected, rel=0.01
-    )  # its borders are a texel of the light's view
 
 
 def test_a_plain_solid_pays_for_no_second_layer() -> None:
