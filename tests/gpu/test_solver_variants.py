@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -55,11 +56,17 @@ def gradient(f: Surface, points: FloatArray) -> FloatArray:
     return np.stack([(f(points + h * e) - f(points - h * e)) / (2.0 * h) for e in np.eye(3)], axis=-1)
 
 
-def buffers(f: Surface, origin: FloatArray, d: FloatArray, length: float = 9.0) -> Buffers:
-    """The surface f = 0 as depths, planes and normals, and rays."""
+@cache
+def surface_of(f: Surface) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Depths, planes and unit normals of the surface f = 0 in the picture."""
     depth, planes = gbuffer(f)
     normal = gradient(f, texel_rays()[1] * np.where(depth > 0.0, depth, 1.0)[..., None])
-    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    return depth, planes, normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+
+def buffers(f: Surface, origin: FloatArray, d: FloatArray, length: float = 9.0) -> Buffers:
+    """The surface and rays over it."""
+    depth, planes, normal = surface_of(f)
     return Buffers(camera(), depth, planes, normal, origin, with_length(d, length))
 
 
@@ -113,7 +120,7 @@ def test_every_step_squares_the_error(device: Device, surface: Surface) -> None:
     """e_(k+1) = C e_k^2, pixel by pixel: rays to the same points in the same directions, from once and twice as far
     off, start twice and end four times as far away; one C bounds the next steps too, down to the texels' grain.
     """
-    depth, _ = gbuffer(surface)
+    depth, _, _ = surface_of(surface)
     ray = texel_rays()[1]
     goal = ray * depth[..., None]
     d = ray / np.linalg.norm(ray, axis=-1, keepdims=True) + [0.35, 0.2, 0.0]
