@@ -37,7 +37,7 @@ class LayerShares:
 
     `right`: solved within one pixel (max norm) of the truth; `wrong`: said to be solved elsewhere; `hidden`: said to
     end behind something; `second`: solved in the second layer, and `second_right` of these within one pixel.
-    `cost`: processor time of a whole frame over that with one layer.
+    `cost`: processor time of a whole frame, light views and all, over that with one layer.
     """
 
     rays: int
@@ -91,6 +91,7 @@ def eye_layers(
                     size,
                     method,
                     backend=backend,
+                    keep=False,
                     aovs=("solve_status", "solve_hit"),
                     options={"depth_layers": layers, "refraction_steps": 16384},
                 )

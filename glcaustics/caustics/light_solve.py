@@ -213,6 +213,7 @@ class LightMapMethod(CausticsMethod):
                 reads=(
                     f"gbuffer{layer}.depth_m",
                     f"gbuffer{layer}.normal_ws",
+                    *((f"gbuffer{layer}.depth",) if layer else ()),
                     *(self.map_resource(light, receiver) for light, receiver in maps),
                     *(light.resource(f"receiver.{receiver.name}.position_ws") for light, receiver in maps),
                     *(r for light, receiver in maps for r in self.warp_reads(light, receiver)),
@@ -352,8 +353,9 @@ class LightMapMethod(CausticsMethod):
         ctx.device.draw_points(program, target, copies * width * height, blend="add")
 
     def _gather(self, ctx: PassContext, maps: list[tuple[LightSetup, ReceiverView]], layer: str) -> None:
-        target = ctx.target(irradiance_of(layer))
-        target.clear(0.0, 0.0, 0.0, 0.0)
+        ctx.target(irradiance_of(layer)).clear(0.0, 0.0, 0.0, 0.0)
+        # The second layer is mostly empty: its depth buffer keeps the shader from running there.
+        target = ctx.target(irradiance_of(layer), depth=f"gbuffer{layer}.depth" if layer else None)
         for light, receiver in maps:
             warp = self.warp_define(light, receiver)
             program = ctx.device.program(f"{SHADERS}/gather", {"RECEIVER_FACES": receiver.view.faces, "WARP": warp})
@@ -369,7 +371,7 @@ class LightMapMethod(CausticsMethod):
                     "u_max_taps": int(ctx.setup.options["gather_taps"]) if receiver.inner_ndc is None else CORE_TAPS,
                 }
             )
-            ctx.device.draw_fullscreen(program, target, blend="add")
+            ctx.device.draw_fullscreen(program, target, blend="add", depth_func=">" if layer else None)
 
     # -- statistics ---------------------------------------------------------------------------------------------------
 

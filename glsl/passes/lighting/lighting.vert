@@ -1,7 +1,1 @@
-// One triangle over the picture at the far plane, so that the test against a layer's depth buffer can pass over empty pixels.
-out vec2 v_uv;
-
-void main() {
-    v_uv = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);
-    gl_Position = vec4(v_uv * 2.0 - 1.0, 1.0, 1.0);
-}
+#include "interface/fullscreen_far.glsl"

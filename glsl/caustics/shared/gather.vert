@@ -1,0 +1,1 @@
+#include "interface/fullscreen_far.glsl"
