@@ -143,6 +143,8 @@ def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
         "RETRY": stage.get("RETRY", 0),
         "REFLECTION": stage.get("REFLECTION", 0),
         "USE_NEWTON": stage["NEWTON"],
+        # The cascade marches instead; and with few look-ups there is no time for it.
+        "RESTARTS": int(ctx.setup.options["refraction"] == "newton" and ctx.setup.options["refraction_iterations"] > 4),
         "USE_MARCH": stage["MARCH"],
         "USE_SOUSA": stage["SOUSA"],
         "HAS_SOLID": int(OpticalKind.SOLID in kinds),

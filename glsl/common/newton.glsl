@@ -28,11 +28,14 @@ const float GLC_SOLVE_TOLERANCE_PX = 1.0;
 
 // t_plane: rgba32f planes. facing: 1 for surfaces that the ray enters from the eye's side, -1 for those it leaves towards it.
 // The loop holds one break and no other branch: what failed is told apart after it.
-// u: where to look first.
-GlcSolve glc_newton_from(sampler2D t_plane, GlcRasterRay ray, float facing, float u, int max_iterations) {
+// u: where to look first. restarts: where the bracket closes without a surface, or the ray is behind one that it does not meet, the
+// search goes on beyond that, where the last surface before it led to; pays from some six look-ups on, among thin things. Constants,
+// facing and restarts cost nothing where they are not used.
+GlcSolve glc_newton_from(sampler2D t_plane, GlcRasterRay ray, float facing, float u, bool restarts, int max_iterations) {
     GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_DIVERGED, 0);
     vec2 last = vec2(textureSize(t_plane, 0)) - 1.0;
-    float front = 0.0, behind = 1.0;
+    float front = 0.0, behind = 1.0, ahead = 0.0;
+    float extent = max(abs(ray.step.x), abs(ray.step.y)), pixel = 1.0 / max(extent, 1e-6);
     bool hit = false;
     for (int i = 0; i < max_iterations; ++i) {
         vec2 texel = clamp(floor(ray.start.xy + u * ray.step.xy), vec2(0.0), last);
@@ -46,14 +49,23 @@ GlcSolve glc_newton_from(sampler2D t_plane, GlcRasterRay ray, float facing, floa
         hit = solve.error_px <= GLC_SOLVE_TOLERANCE_PX;
         bool before = u * f.y >= f.x;
         front = before ? u : front;
+        solve.u_front = before ? u : solve.u_front;
         behind = before ? behind : u;
-        u = hit || (met > front - 1e-6 && met < behind + 1e-6) ? met : 0.5 * (front + behind);
+        bool inside = met > front - 1e-6 && met < behind + 1e-6;
+        u = hit || inside ? met : 0.5 * (front + behind);
+        if (restarts && !hit) {
+            bool passed = !before && !inside && ahead > behind + pixel;
+            ahead = before && !inside && met < 1.0 ? met : ahead;
+            if (passed || behind - front < pixel) {
+                front = behind;
+                behind = 1.0;
+                u = ahead > front ? ahead : min(front + 2.0 * pixel, 1.0);
+            }
+        }
         u = hit ? u : min(u, ray.u_screen);
         if (hit) break;
     }
     solve.u = u;
-    solve.u_front = front;
-    float extent = max(abs(ray.step.x), abs(ray.step.y));
     if (hit) solve.status = GLC_SOLVE_HIT;
     else if (u >= ray.u_screen && ray.u_screen < 1.0) solve.status = GLC_SOLVE_OFFSCREEN;
     else if ((behind - front) * extent < 1.0) solve.status = GLC_SOLVE_DISCONTINUITY;
@@ -62,5 +74,5 @@ GlcSolve glc_newton_from(sampler2D t_plane, GlcRasterRay ray, float facing, floa
 
 // The same, from the ray's own pixel: the start of Mayer et al.
 GlcSolve glc_newton(sampler2D t_plane, GlcRasterRay ray, float facing, int max_iterations) {
-    return glc_newton_from(t_plane, ray, facing, 0.0, max_iterations);
+    return glc_newton_from(t_plane, ray, facing, 0.0, false, max_iterations);
 }

@@ -24,7 +24,7 @@ Surface = Callable[[FloatArray], FloatArray]  # of points (..., 3): 0 on the sur
 SIZE = (192, 128)
 TAN_Y = 0.5
 HIT, OFFSCREEN, DISCONTINUITY, DIVERGED, NOTHING, HIDDEN = 1, 2, 3, 4, 5, 6
-NEWTON, DDA, HIERARCHICAL = 0, 1, 2
+NEWTON, DDA, HIERARCHICAL, RESTARTING = 0, 1, 2, 3
 
 SHADER = """
 #include "common/ray_march.glsl"
@@ -44,6 +44,7 @@ void main() {
     GlcRasterRay ray = glc_raster_ray(u_raster_from_world, u_size, texelFetch(t_origin, at, 0).xyz, d.xyz, d.w);
     GlcSolve solve;
     if (u_solver == 0) solve = glc_newton(t_plane, ray, 1.0, u_iterations);
+    else if (u_solver == 3) solve = glc_newton_from(t_plane, ray, 1.0, 0.0, true, u_iterations);
     else if (u_solver == 1) solve = glc_march_dda(t_depth, t_plane, false, ray, u_iterations);
     else solve = glc_march_hierarchical(t_bounds, t_plane, ray, u_iterations);
     o_solve = vec4(glc_raster_distance(ray, solve.u), solve.error_px, float(solve.status), float(solve.iterations));
@@ -320,3 +321,35 @@ def test_an_empty_buffer_gives_no_hit_and_no_nan(bench: Bench, solver: int) -> N
     nothing = np.zeros((SIZE[1], SIZE[0]))
     found = bench.solve(nothing, np.zeros((*nothing.shape, 4)), origin, with_length(d, 9.0), solver, 64)
     assert np.isfinite(found).all() and (found[..., 2] != HIT).all()
+
+
+def slats(p: FloatArray) -> FloatArray:
+    """A wavy wall at 4 m, and a metre before it thin slats, 8 cm wide, every quarter metre."""
+    across = np.abs(np.mod(p[..., 0], 0.25) - 0.125) - 0.04
+    return np.minimum(
+        p[..., 2] + 4.0 - 0.1 * np.sin(5.0 * p[..., 0]), np.maximum(np.abs(p[..., 2] + 3.05) - 0.05, across)
+    )
+
+
+def test_restarts_find_surfaces_beyond_what_the_ray_passes_behind(bench: Bench) -> None:
+    """Rays between slats and wall: of what pixel-exact marching finds, restarts find more, and nothing else."""
+    depth, planes = gbuffer(slats)
+    _, ray = texel_rays()
+    origin = ray * 3.2
+    d = np.broadcast_to(np.array([0.66, 0.1, -0.745]), origin.shape)
+    ends = {
+        solver: bench.solve(depth, planes, origin, with_length(d, 1.5), solver, count)
+        for solver, count in ((NEWTON, 8), (RESTARTING, 8), (DDA, 4096))
+    }
+    exact = ends[DDA]
+    resolvable = (exact[..., 2] == HIT) & (depth > 3.5)  # pixels that look between the slats
+
+    def share(solver: int) -> float:
+        found = ends[solver]
+        return float(((found[..., 2] == HIT) & (np.abs(found[..., 0] - exact[..., 0]) < 0.03))[resolvable].mean())
+
+    assert resolvable.mean() > 0.2
+    assert share(RESTARTING) > share(NEWTON) + 0.02
+    truth = cast(lambda p: np.maximum(slats(p), p[..., 2] + 3.15), origin, d, 1.5)  # the wall alone
+    wrong = (ends[RESTARTING][..., 2] == HIT) & (np.abs(ends[RESTARTING][..., 0] - truth) > 0.03)
+    assert wrong[resolvable].mean() < 0.01

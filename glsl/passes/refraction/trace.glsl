@@ -96,7 +96,8 @@ End end_beyond(GlcRasterRay ray, GlcSolve solve) {
     vec2 mirrored = clamp(px - beyond * (folded / max(reach, 1e-3)), vec2(0.5), u_raster_size - 0.5);
     vec4 other = texelFetch(t_plane, ivec2(mirrored), 0);
     float s = plane.z + dot(plane.xy, mirrored);
-    if (other.w > 0.0 && abs(other.z + dot(other.xy, mirrored) - s) < 0.04 * abs(s)) px = mirrored;
+    float there = other.z + dot(other.xy, mirrored);
+    if (other.w > 0.0 && there < ray.start.z && abs(there - s) < 0.3 * abs(s)) px = mirrored;
     float status = solve.status == GLC_SOLVE_OFFSCREEN ? GLC_VIEW_OFFSCREEN : (hidden ? GLC_VIEW_HIDDEN : GLC_VIEW_FALLBACK);
     return meets ? End(px / u_raster_size, glc_raster_distance(ray, met), status) : End(vec2(-1.0), ray.length_m, GLC_VIEW_SKY);
 }
@@ -138,7 +139,7 @@ Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved) {
     float status = GLC_VIEW_NEWTON;
     bool in_view = false;
 #if USE_NEWTON
-    solve = glc_newton(t_plane, ray, 1.0, u_refraction_iterations);
+    solve = glc_newton_from(t_plane, ray, 1.0, 0.0, RESTARTS == 1, u_refraction_iterations);
     in_view = solve.status == GLC_SOLVE_HIT;
 #endif
 #if USE_MARCH
@@ -176,7 +177,7 @@ GlcSolve solve_again(vec3 p, GlcRasterRay ray) {
     bool seen = q.w > 0.0 && all(greaterThanEqual(was, vec2(0.0))) && all(lessThan(was, u_raster_size));
     float last_m = seen ? texelFetch(t_last_reflection_m, ivec2(was), 0).r : 0.0;
     int iterations = last_m > 0.0 ? REFLECTION_ITERATIONS : 0;
-    GlcSolve solve = glc_newton_from(t_plane, ray, 1.0, clamp(glc_raster_at(ray, last_m), 0.0, ray.u_screen), iterations);
+    GlcSolve solve = glc_newton_from(t_plane, ray, 1.0, clamp(glc_raster_at(ray, last_m), 0.0, ray.u_screen), false, iterations);
     if (!glc_way_is_clear(t_bounds, u_raster_size, ray, solve, CLEAR_POINTS)) solve.status = GLC_SOLVE_DIVERGED;
     return solve;
 }
