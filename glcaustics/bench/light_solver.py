@@ -24,7 +24,8 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class LightSolver:
-    """The light solve of one scene, light and time, without the rest of the frame.
+    """The light solve of one scene, light and time: of refracted light, without total reflections or the rest of the
+    frame.
 
     Raises:
         UsageError: the method solves in no light view, or the light needs a cube of views.
@@ -36,7 +37,8 @@ class LightSolver:
         if not issubclass(chosen, LightMapMethod):
             raise UsageError(f"method {method} has no light solve to count iterations of", where="light_rays")
         self._method = chosen()
-        options = resolve_options(chosen, quality, {"reflect": False, "dispersion": False})
+        # Total reflections inside a solid are marched, not iterated: they would count against every count.
+        options = resolve_options(chosen, quality, {"reflect": False, "dispersion": False, "internal_bounces": 0})
         self.setup = FrameSetup.analyse(lit, (64, 64), options, transmissive_shadows=True)
         self.light: LightSetup = self.setup.lights[0]
         self.device, self._gpu = device, GpuScene(device)
