@@ -20,7 +20,19 @@ from glcaustics.passes.runner import PlanRunner
 from glcaustics.renderer import Frame, plan_frame, resolve_options
 from glcaustics.scene.model import Camera, Image, Instance, Material, Scene
 from glcaustics.scene.transform import scaled
-from tests.gpu.feature_scenes import BACKEND, GLASS, WHITE, box, from_above, plane, scene_of, sheet, sun, translation
+from tests.gpu.feature_scenes import (
+    BACKEND,
+    GLASS,
+    MIRROR,
+    WHITE,
+    box,
+    from_above,
+    plane,
+    scene_of,
+    sheet,
+    sun,
+    translation,
+)
 from tests.gpu.physics_meshes import grid_triangles, make_mesh
 
 pytestmark = pytest.mark.gpu
@@ -197,6 +209,25 @@ def test_behind_a_tilted_pane() -> None:
     errors = [np.abs(frame.image - bare).mean(axis=2)[lit] / bare.mean() for frame in (one, two)]
     print("pane: share", second.mean(), "mean error with one layer", errors[0].mean(), "two", errors[1].mean())
     assert errors[1].mean() < 0.005 and np.median(errors[1]) < 1e-4 and errors[0].mean() > 0.1
+
+
+def before_a_mirror(*, block: bool) -> Scene:
+    """A mirror on the floor shows the part of a wall that a post hides from the eye."""
+    upright = replace(board("wall", 3.0, 0.0), world_from_object=translation(0.0, 0.5, -2.5) @ rotation_x(90.0))
+    post = [box("post", (1.6, 0.5, 0.2), (0.0, 0.9, -1.2), Material("post", base_color=(0.6, 0.1, 0.1)))]
+    camera = Camera.look_at((0.0, 1.6, 2.4), (0.0, 0.5, -1.0), yfov_rad=0.9)
+    light = replace(sun(), direction_ws=(0.0, -math.sqrt(0.5), -math.sqrt(0.5)), intensity=100.0)
+    return scene_of([upright, plane("mirror", 2.0, 0.0, MIRROR), *(post if block else [])], [light], camera)
+
+
+def test_reflected_rays_find_the_second_layer_too() -> None:
+    bare = render(before_a_mirror(block=False), 1, reflection_steps=512).image
+    one, two = (render(before_a_mirror(block=True), n, reflection_steps=512) for n in (1, 2))
+    second = two.aov["solve_status"] == SECOND
+    np.testing.assert_array_equal(second, one.aov["solve_status"] == HIDDEN)
+    errors = [np.abs(frame.image - bare).mean(axis=2)[second] / bare.mean() for frame in (one, two)]
+    print("mirror: share", second.mean(), "mean error with one layer", errors[0].mean(), "two", errors[1].mean())
+    assert second.sum() > 500 and errors[1].mean() < 1e-4 and errors[0].mean() > 0.3
 
 
 @pytest.mark.parametrize("method", ["caustic_map", "displaced_mesh"])
