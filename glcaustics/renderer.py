@@ -49,6 +49,7 @@ BASE_LADDER: dict[str, dict[str, Any]] = {
         "refraction_iterations": iterations,
         "refraction_steps": steps,
         "reflection_steps": reflection,
+        "reflection_history": False,
         "depth_layers": 1,
     }
     for quality, shadow, rsm_size, solver, iterations, steps, reflection in (
@@ -106,6 +107,10 @@ def resolve_options(method: type[CausticsMethod] | None, quality: str, options: 
         value = resolved[name]
         if name == "refraction":
             refraction.check_solver(value)
+            continue
+        if isinstance(base, bool):
+            if not isinstance(value, bool):
+                raise UsageError(f"option {name} is {value!r}", where="--set", remedy="use true or false")
             continue
         if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 16384:
             raise UsageError(

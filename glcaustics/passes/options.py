@@ -9,5 +9,6 @@ OPTION_HELP: dict[str, str] = {
     "refraction_iterations": "look-ups of Newton's method an eye ray (1..16384)",
     "refraction_steps": "of the march that follows a refracted ray (1..16384)",
     "reflection_steps": "of the march that follows a reflected ray (1..16384)",
+    "reflection_history": "reflected rays are solved from where they ended in the last frame (true, false; cascade)",
     "depth_layers": "2: eye rays that end behind something are solved in a second layer of opaque surfaces (1, 2)",
 }

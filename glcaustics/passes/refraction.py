@@ -34,7 +34,6 @@ OUTPUTS = {
     "SOLVE": "view.solve",
 }
 TODO_DEPTH, REFLECTION_M = "view.todo_depth", "view.reflection_m"
-REFLECTED = {"RADIANCE": "view.radiance", "REFLECTION_M": REFLECTION_M}
 
 
 def check_solver(name: object) -> None:
@@ -50,7 +49,7 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
     solids = OpticalKind.SOLID in setup.kinds()
     stages = {
         TODO_DEPTH: TextureDesc("depth24", setup.size),
-        REFLECTION_M: TextureDesc("r32f", setup.size, "m"),
+        **({REFLECTION_M: TextureDesc("r32f", setup.size, "m")} if _seeds(setup) else {}),
     }
     second: tuple[str, ...] = (
         SECOND_LAYER if int(setup.options.get("depth_layers", 1)) > 1 and solver != "sousa" else ()
@@ -76,7 +75,7 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
             ),
             optional=("caustics.irradiance", *second),
             always_writes=("view.radiance", "view.todo", *stages) if cascade else (),
-            history=(REFLECTION_M,) if cascade else (),
+            history=(REFLECTION_M,) if _seeds(setup) else (),
             note=f"what water, glass and mirrors show; eye rays: {SOLVERS[solver]}{_eye_at_start(setup)}",
         )
     )
@@ -118,16 +117,28 @@ def _finish(ctx: PassContext, outputs: dict[str, int]) -> None:
         target = ctx.target(*OUTPUTS.values(), depth=TODO_DEPTH)
         device.draw_fullscreen(program.set(u_mask_depth=0.75), target, depth_func="<=")
     with device.timer("refraction/reflection"):
-        ctx.target(REFLECTION_M).clear()
-        outputs = {f"HAS_{name}": 0 for name in OUTPUTS} | ctx.locations(**REFLECTED)
-        program = _program(ctx, outputs, NEWTON=0, MARCH=_MARCH["cascade"], SOUSA=0, FINAL=1, REFLECTION=1)
+        _reflect(ctx)
+
+
+def _reflect(ctx: PassContext) -> None:
+    """Reflections that count, added to the picture; with `reflection_history` from the last frame's ends on."""
+    seeds = _seeds(ctx.setup)
+    written = {"RADIANCE": "view.radiance", **({"REFLECTION_M": REFLECTION_M} if seeds else {})}
+    outputs = {f"HAS_{name}": 0 for name in OUTPUTS} | ctx.locations(**written)
+    stage = {"NEWTON": 0, "MARCH": _MARCH["cascade"], "SOUSA": 0, "FINAL": 1, "REFLECTION": 1, "SEEDED": int(seeds)}
+    program = _program(ctx, outputs, **stage)
+    if seeds:
+        ctx.target(REFLECTION_M).clear()  # added to, as the radiance is
         before = ctx.frame.history_camera or ctx.frame.camera
-        program.set(
-            t_last_reflection_m=ctx.history(REFLECTION_M),
-            u_last_raster_from_world=raster_from_world(before, ctx.setup.size),
-        )
-        target = ctx.target(*REFLECTED.values(), depth=TODO_DEPTH)
-        device.draw_fullscreen(program.set(u_mask_depth=0.25), target, depth_func="<=", blend="add")
+        program.set(t_last_reflection_m=ctx.history(REFLECTION_M))
+        program.set(u_last_raster_from_world=raster_from_world(before, ctx.setup.size))
+    target = ctx.target(*written.values(), depth=TODO_DEPTH)
+    ctx.device.draw_fullscreen(program.set(u_mask_depth=0.25), target, depth_func="<=", blend="add")
+
+
+def _seeds(setup: FrameSetup) -> bool:
+    """Whether reflected rays start from the last frame's solution."""
+    return setup.options["refraction"] == "cascade" and bool(setup.options.get("reflection_history", False))
 
 
 def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
@@ -142,6 +153,7 @@ def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
         "HAS_SECOND": int(stage["FINAL"] and ctx.has("shade2.radiance")),
         "RETRY": stage.get("RETRY", 0),
         "REFLECTION": stage.get("REFLECTION", 0),
+        "SEEDED": stage.get("SEEDED", 0),
         "USE_NEWTON": stage["NEWTON"],
         # The cascade marches instead; and with few look-ups there is no time for it.
         "RESTARTS": int(ctx.setup.options["refraction"] == "newton" and ctx.setup.options["refraction_iterations"] > 4),

@@ -114,7 +114,8 @@ def test_reflections_seeded_by_the_last_frame_show_what_marched_ones_show() -> N
         difference = np.abs(a.astype(np.float64) - b).max(axis=-1)
         return float((difference > 1e-2 * b.mean()).mean()), float((a.mean() - b.mean()) / b.mean())
 
-    with glc.Renderer(still, SIZE, "none", backend=BACKEND) as made:
+    seeded = {"reflection_history": True}
+    with glc.Renderer(still, SIZE, "none", backend=BACKEND, options=seeded) as made:
         first, second, moved = (made.render(t).image for t in (0.0, 0.0, 0.05))
         texture = made._runner.texture("view.reflection_m")  # type: ignore[union-attr]
         metres = np.frombuffer(texture.read(), np.float32)

@@ -17,7 +17,7 @@ uniform sampler2D t_bounds;
 #if HAS_CAUSTICS_VIEW
 uniform sampler2D t_caustics;
 #endif
-#if REFLECTION
+#if SEEDED
 uniform sampler2D t_last_reflection_m;     // of the last frame, by its own raster space
 uniform mat4 u_last_raster_from_world;
 #endif
@@ -169,7 +169,7 @@ Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved) {
 #endif
 }
 
-#if REFLECTION
+#if SEEDED
 // Newton's method from where the ray of the same point ended in the last frame. Its hit counts if the way to it is clear, too.
 GlcSolve solve_again(vec3 p, GlcRasterRay ray) {
     vec4 q = u_last_raster_from_world * vec4(p, 1.0);
@@ -189,7 +189,7 @@ Seen look_along(vec3 p, vec3 d, int steps) {
     GlcRasterRay ray = eye_ray(p, d);
     float status = GLC_VIEW_MARCHED;
     bool mixes, in_view = true;
-#if REFLECTION
+#if SEEDED
     GlcSolve solve = solve_again(p, ray);
     if (solve.status != GLC_SOLVE_HIT) solve = MARCH(ray, steps, in_view);
 #else
