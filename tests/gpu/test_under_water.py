@@ -122,21 +122,24 @@ def test_a_mirror_under_water_is_absorbed_on_both_ways() -> None:
     """An upright mirror shows the floor as far away as the way over the mirror is."""
     mirror = box("mirror", (8.0, 4.0, 0.2), (0.0, -2.0, -2.1), MIRROR)
     scene = pool((0.0, -1.0, 0.0), (0.0, -1.7, -1.0), mirror, fov=1.5)
-    frame, d = look(scene, quality="high"), rays(scene.camera)
+    frame, d = look(scene), rays(scene.camera)
     virtual = d * (1.0 / np.maximum(-d[..., 1:2], 1e-3))  # where the ray would meet the floor without the mirror
     shows = (virtual[..., 2] < -2.2) & (virtual[..., 2] > -3.5) & (np.abs(virtual[..., 0]) < 1.0)
     expected = floor_radiance() * np.exp(-SEA.sigma_a * np.linalg.norm(virtual, axis=2)[..., None])
     assert shows.sum() > 60
-    np.testing.assert_allclose(np.median((frame.image / expected)[shows], axis=0), 1.0, rtol=0.01)
+    np.testing.assert_allclose(np.median(frame.image[shows] / expected[shows], axis=0), 1.0, rtol=0.01)
 
 
 def test_a_ball_of_water_under_water_cannot_be_seen() -> None:
     """Index and absorption are the medium's: what refracts is the ratio of the two indices."""
     ball = Instance("ball", icosphere("ball", 0.3, 24), replace(SEA, name="drop"), translation(0.0, -1.5, -1.0))
-    images = [look(pool((0.0, -1.0, 0.0), (0.0, -1.5, -1.0), *more), quality="high").image for more in ([], [ball])]
-    difference = np.abs(images[1].astype(np.float64) - images[0]).max(axis=2) / images[0].mean()
-    print("ball of water in water: mean", difference.mean(), "97th percentile", np.percentile(difference, 97))
-    assert difference.mean() < 0.01 and np.percentile(difference, 97) < 0.03
+    scenes = [pool((0.0, -1.0, 0.0), (0.0, -1.5, -1.0), *more) for more in ([], [ball])]
+    bare, frame = (look(scene, method="none") for scene in scenes)
+    shown = (frame.aov["solve_status"] > 0) & (bare.aov["solve_status"] == 0)
+    assert shown.sum() > 500
+    difference = np.abs(frame.image.astype(np.float64) - bare.image)[shown] / bare.image.mean()
+    print("ball of water in water: mean", difference.mean(), "largest", difference.max())
+    assert np.percentile(difference, 99) < 1e-3 and difference.max() < 0.05
 
 
 def test_inside_a_block_of_glass() -> None:
