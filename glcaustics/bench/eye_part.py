@@ -12,13 +12,14 @@ from glcaustics.bench.cells import Cells, Measured
 from glcaustics.bench.eye_cost import eye_cost
 from glcaustics.bench.eye_rays import PUBLISHED, eye_study, seeded_cameras
 from glcaustics.bench.light_rays import light_study
+from glcaustics.bench.machine import instrument_key
 from glcaustics.bench.measure import picture
 from glcaustics.bench.plan import EyePlan, Plan
 from glcaustics.scene.load import load_scene
 
 FloatArray = npt.NDArray[np.float64]
 NOTHING = {"none": np.zeros(0)}  # a cell has arrays; these have none to keep
-VERSION = 1  # of these cells: raise it when the instruments change
+INSTRUMENTS = ("eye_rays", "eye_truth", "eye_cost", "light_rays", "light_solver", "convergence")
 
 
 def count_steps(plan: Plan) -> int:
@@ -59,7 +60,7 @@ class EyePart:
         }
 
     def _key(self, name: str, what: str, *parts: Any) -> str:
-        return self.cells.key("eye", VERSION, what, name, *parts)
+        return self.cells.key("eye", instrument_key(*INSTRUMENTS), what, name, *parts)
 
     def _eye(self, name: str) -> list[dict[str, Any]]:
         p = self.settings

@@ -74,6 +74,11 @@ def commit() -> dict[str, Any]:
     return {"commit": git("rev-parse", "HEAD"), "dirty": None if status is None else bool(status)}
 
 
+def instrument_key(*modules: str) -> str:
+    """A key of modules of the bench, by name: for measurements that change with their instrument."""
+    return digest(*(Path(__file__).with_name(f"{name}.py").read_bytes() for name in modules))
+
+
 def code_key() -> str:
     """A key of the renderer's code: what is measured again when it changes. The bench itself does not count."""
     package = Path(glcaustics.__file__).resolve().parent

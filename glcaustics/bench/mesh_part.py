@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from glcaustics import metrics
 from glcaustics.bench.cells import Cells, Measured
+from glcaustics.bench.machine import instrument_key
 from glcaustics.bench.mitsuba_truth import Halves
 from glcaustics.bench.plan import MeshPlan, Plan
 from glcaustics.bench.references import BEAMS_VERSION
@@ -33,7 +34,7 @@ FloatArray = npt.NDArray[np.float64]
 METHOD, QUALITY = "displaced_mesh", "high"
 BINS, INNER = 512, 64  # bins a side, and those cut off at each edge
 SLANTED = (0.2, -1.0, 0.1)
-VERSION = 1  # of these cells: raise it when what they hold changes
+INSTRUMENTS = ("mesh_part",)  # whose code the cells depend on
 
 
 def count_steps(plan: Plan) -> int:
@@ -125,7 +126,7 @@ class MeshPart:
                 image = luminance(renderer.render().aov["caustic_irradiance"])
             return {"options": options}, {"image": box_filter(image, (BINS, BINS)).astype(np.float32)}
 
-        key = self.cells.key("mesh", VERSION, scene_key(scene), pixels, options)
+        key = self.cells.key("mesh", instrument_key(*INSTRUMENTS), scene_key(scene), pixels, options)
         label = f"peer-pool, s={strength:g}: mesh {size[0]}^2, map {size[1]}^2"
         return self.cells.cell(label, key, make)[1]["image"].astype(np.float64)
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from glcaustics import metrics
 from glcaustics.bench.cells import Cells, Measured
 from glcaustics.bench.equal_error import compare
-from glcaustics.bench.machine import versions
+from glcaustics.bench.machine import instrument_key, versions
 from glcaustics.bench.measure import flip_of
 from glcaustics.bench.mitsuba_truth import Halves, agreement
 from glcaustics.bench.mitsuba_view import ViewPtracer, view_ptracer_reference
@@ -34,7 +34,7 @@ from glcaustics.scene.model import Scene
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 VALIDATION_SIDE = 64
-VERSION = 1  # of these cells: raise it when what they hold changes
+INSTRUMENTS = ("photons", "given")  # whose code the cells depend on
 
 
 def count_steps(plan: Plan, peers: bool) -> int:
@@ -93,7 +93,12 @@ class PhotonsPart:
     def _key(self, scene: Scene, *parts: Any) -> str:
         camera = scene.view_at(0.0)
         return self.cells.key(
-            "photons", VERSION, scene.name, scene_key(scene), np.asarray(camera.world_from_camera), *parts
+            "photons",
+            instrument_key(*INSTRUMENTS),
+            scene.name,
+            scene_key(scene),
+            np.asarray(camera.world_from_camera),
+            *parts,
         )
 
     # -- the reference ------------------------------------------------------------------------------------------------

@@ -61,6 +61,10 @@ def _convergence(eye: Mapping[str, Any], scene: str) -> bytes:
             color, name = COLORS[index], one.get("branch", "all views")
             for view in one["views"]:
                 axes.plot(view["iterations"], view[share], color=color, linewidth=0.7, alpha=0.5)
+            if one.get("by_ray_casting"):
+                truth = one["by_ray_casting"]["pooled"]
+                label = "against ray casting"
+                axes.plot(truth["iterations"], truth[share], "--", color="#525252", linewidth=1.6, label=label)
             pooled = one["pooled"]
             axes.plot(
                 pooled["iterations"],

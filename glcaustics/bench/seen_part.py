@@ -18,7 +18,7 @@ import numpy.typing as npt
 from glcaustics import metrics
 from glcaustics.bench.cells import Cells, Measured
 from glcaustics.bench.equal_error import compare
-from glcaustics.bench.machine import versions
+from glcaustics.bench.machine import instrument_key, versions
 from glcaustics.bench.measure import Timing, frame_ms, summary
 from glcaustics.bench.mitsuba_scene import best_variant
 from glcaustics.bench.mitsuba_seen import seen_radiance
@@ -38,7 +38,7 @@ OVERSAMPLING = 2  # ours is drawn this much larger a side and averaged, as Mitsu
 SLANT_RAD, DISTANCE, SPAN = math.radians(25.0), 4.0, 0.45  # of the eye; in half sides of the target
 METHOD = "auto"
 SOLVED = (1, 5)  # of `solve_status`: the picture holds what the eye's ray meets
-VERSION = 2  # of these cells: raise it when what they hold changes
+INSTRUMENTS = ("seen_part", "mitsuba_seen")  # whose code the cells depend on
 
 
 def count_steps(plan: Plan) -> int:
@@ -115,7 +115,16 @@ class SeenPart:
         self.cells.step(f"{p.scene}: reference through the water")
         source = f"float64 beams at {p.map_side}^2, then Mitsuba path ({best_variant()}), 2 x {p.spp} samples a pixel"
         pose = np.asarray(scene.camera.world_from_camera)
-        key = digest("seen", VERSION, scene_key(scene), pose, scene.camera.yfov_rad, asdict(p), self.plan.cells, source)
+        key = digest(
+            "seen",
+            instrument_key(*INSTRUMENTS),
+            scene_key(scene),
+            pose,
+            scene.camera.yfov_rad,
+            asdict(p),
+            self.plan.cells,
+            source,
+        )
         if kept := self.cells.truths.load(key):
             return Halves(kept[1]["first"], kept[1]["second"], 0.0, source)
         start = time.perf_counter()
@@ -147,7 +156,7 @@ class SeenPart:
             }
             return {"time_ms": times, "pixels": p.side, "solved": float(arrays["solved"].mean())}, arrays
 
-        key = self.cells.key("seen", VERSION, scene_key(scene), asdict(p), vars(timing), quality)
+        key = self.cells.key("seen", instrument_key(*INSTRUMENTS), scene_key(scene), asdict(p), vars(timing), quality)
         return self.cells.cell(f"{p.scene} through the water: {quality}", key, make)
 
     def _peers(self, scene: Scene, target: Target, truth: Halves) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
@@ -169,7 +178,14 @@ class SeenPart:
                 return self._two_stages(scene, target, tracer, count, spp, with_denoiser)
 
             key = self.cells.key(
-                "seen peer", VERSION, versions(), scene_key(scene), asdict(p), count, spp, with_denoiser
+                "seen peer",
+                instrument_key(*INSTRUMENTS),
+                versions(),
+                scene_key(scene),
+                asdict(p),
+                count,
+                spp,
+                with_denoiser,
             )
             rows, arrays = self.cells.cell(f"{p.scene} through the water: Mitsuba, {count} photons", key, make)
             for method, row in rows.items():

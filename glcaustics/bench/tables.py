@@ -203,20 +203,20 @@ def _convergence_table(found: Sequence[Any], name: str, share: str, views: str, 
         pooled = one["pooled"]
         label = one["scene"] + (f", {one['branch']}" if "branch" in one else "")
         last = [pooled["cascade"], pooled["hierarchical"]] if "cascade" in pooled else [pooled["marched"]]
-        rows.append(
-            [label, *(f"{v:.4f}" for v in pooled[share]), f"{max(pooled['wrong']):.4f}", *(f"{v:.4f}" for v in last)]
-        )
+        shares = [f"{v:.4f}" for v in pooled[share]]
+        rows.append([label, *shares, f"{max(pooled['wrong']):.4f}", *(f"{v:.4f}" for v in last)])
+        if one.get("by_ray_casting"):
+            truth = one["by_ray_casting"]["pooled"]
+            exact = [f"{v:.4f}" for v in truth[share]]
+            rows.append([f"{label}, by ray casting", *exact, "", "", f"(dda {truth['dda']:.4f})"])
     counts = [str(k) for k in found[0]["pooled"]["iterations"]]
     ends = ("cascade", "hierarchical") if "cascade" in found[0]["pooled"] else ("as shipped",)
-    kind = "eye rays" if name == "pixel" else "light rays"
-    note = (
-        f"{views}"
-        + (f" at {size}" if name == "pixel" else "")
-        + "; of the resolvable rays; wrong: said solved, but farther off"
-    )
-    return Table(
-        f"Newton's share of {kind} within one {name} after k iterations", ("scene", *counts, "wrong", *ends), rows, note
-    )
+    kind, where = ("eye rays", f" at {size}") if name == "pixel" else ("light rays", "")
+    note = f"{views}{where}; of the resolvable rays; wrong: said solved, but farther off"
+    if name == "pixel":
+        note += "; truth: pixel-exact marching, then float64 ray casting"
+    title = f"Newton's share of {kind} within one {name} after k iterations"
+    return Table(title, ("scene", *counts, "wrong", *ends), rows, note)
 
 
 def _cost_table(costs: Sequence[Any]) -> Table:
