@@ -180,14 +180,12 @@ def test_hierarchical_march_finds_what_the_pixel_exact_one_finds() -> None:
     landings = []
     for march in ("hierarchical", "dda"):
         options: dict[str, Any] = {
-            "caster_size": 512,
-            "map_size": 512,
             "view_steps": 2048,
             "march": march,
             "adaptive": False,
         }
         with open_renderer(
-            glc.load_scene("flooded-cornell"), size=400, photons=60_000, denoise=False, **options
+            glc.load_scene("flooded-cornell"), size=320, photons=30_000, denoise=False, **options
         ) as renderer:
             renderer.render()
             runner = renderer._runner
