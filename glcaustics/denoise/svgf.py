@@ -19,7 +19,7 @@ from glcaustics.passes.frame import FrameSetup, PassContext
 SHADERS = "denoise/svgf"
 COLOR, MOMENTS = "svgf.color", "svgf.moments"  # both histories: mean and its length in frames; luminance and its square
 REPROJECTED, REPROJECTED_MOMENTS = "svgf.reprojected", "svgf.reprojected_moments"
-DIFFERENCE, NOISE, CHANGE = "svgf.difference", "svgf.noise", "svgf.change"
+DIFFERENCE, NOISE, DOUBT, CHANGE = "svgf.difference", "svgf.noise", "svgf.doubt", "svgf.change"
 ESTIMATE, GUIDE = "svgf.estimate", "svgf.guide"
 DEPTH, NORMAL, MOTION = "gbuffer.depth_m", "gbuffer.normal_ws", "gbuffer.motion"
 BLOCK = 4  # pixels
@@ -112,7 +112,11 @@ def _declare_change(graph: FrameGraph, size: tuple[int, int], noisy: str) -> Non
     graph.add(
         PassDecl(
             "svgf.blocks",
-            {DIFFERENCE: TextureDesc("rgba32f", blocks), NOISE: TextureDesc("rgba32f", blocks)},
+            {
+                DIFFERENCE: TextureDesc("rgba32f", blocks),
+                NOISE: TextureDesc("rgba32f", blocks),
+                DOUBT: TextureDesc("rg32f", blocks),
+            },
             lambda ctx: _blocks(ctx, noisy),
             reads=(noisy, REPROJECTED, REPROJECTED_MOMENTS),
             note="how the new frame differs from the last ones",
@@ -123,7 +127,7 @@ def _declare_change(graph: FrameGraph, size: tuple[int, int], noisy: str) -> Non
             "svgf.change",
             {CHANGE: TextureDesc("r32f", blocks, filter="linear")},
             _change,
-            reads=(DIFFERENCE, NOISE),
+            reads=(DIFFERENCE, NOISE, DOUBT),
             note="by how much that is more than noise",
         )
     )
@@ -177,11 +181,12 @@ def _blocks(ctx: PassContext, noisy: str) -> None:
         "t_reprojected": ctx.texture(REPROJECTED),
         "t_moments": ctx.texture(REPROJECTED_MOMENTS),
     }
-    _draw(ctx, "blocks", (DIFFERENCE, NOISE), values, BLOCK=BLOCK)
+    _draw(ctx, "blocks", (DIFFERENCE, NOISE, DOUBT), values, BLOCK=BLOCK)
 
 
 def _change(ctx: PassContext) -> None:
-    _draw(ctx, "change", (CHANGE,), {"t_difference": ctx.texture(DIFFERENCE), "t_noise": ctx.texture(NOISE)})
+    inputs = {"t_difference": DIFFERENCE, "t_noise": NOISE, "t_doubt": DOUBT}
+    _draw(ctx, "change", (CHANGE,), {sampler: ctx.texture(resource) for sampler, resource in inputs.items()})
 
 
 def _accumulate(ctx: PassContext, noisy: str) -> None:

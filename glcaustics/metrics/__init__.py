@@ -8,7 +8,7 @@ from glcaustics.metrics.error import (
     psnr,
     relative_rmse,
 )
-from glcaustics.metrics.flicker import moving_flicker, static_flicker
+from glcaustics.metrics.flicker import moving_flicker, static_flicker, surface_flicker
 from glcaustics.metrics.perceptual import FlipResult, flip
 
 __all__ = [
@@ -22,4 +22,5 @@ __all__ = [
     "psnr",
     "relative_rmse",
     "static_flicker",
+    "surface_flicker",
 ]

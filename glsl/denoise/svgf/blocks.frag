@@ -6,7 +6,8 @@ uniform sampler2D t_reprojected;
 uniform sampler2D t_moments;
 
 layout(location = 0) out vec4 o_difference;  // over pixels with a history: sum of new - old, of its square, of 1 / frames, pixels
-layout(location = 1) out vec4 o_noise;       // sums too: variance of a pixel over space, doubt of the resampling; variance over time, pixels
+layout(location = 1) out vec4 o_noise;       // sums too: variance of a pixel over space, 0; variance over time, pixels
+layout(location = 2) out vec2 o_doubt;       // sums of the resampling's doubt, and of its square
 
 // The mixed difference of a quad of pixels knows nothing of what is constant or runs along one axis, but all of the noise.
 float rough(vec4 quad) {
@@ -17,6 +18,7 @@ float rough(vec4 quad) {
 void main() {
     o_difference = vec4(0.0);
     o_noise = vec4(0.0);
+    o_doubt = vec2(0.0);
     ivec2 first = ivec2(gl_FragCoord.xy) * BLOCK, last = textureSize(t_noisy, 0) - 1;
     vec2 seen = vec2(0.0);
     for (int i = 0; i < BLOCK * BLOCK / 4; ++i) {
@@ -35,7 +37,7 @@ void main() {
             float difference = now[k] - then[k];
             o_difference += vec4(difference, difference * difference, 1.0 / before.w, 1.0);
             vec4 moments = texelFetch(t_moments, min(pixel, last), 0);
-            o_noise.y += moments.z;
+            o_doubt += vec2(moments.z, moments.z * moments.z);
             if (before.w < 3.5) continue;   // no variance over time to speak of yet
             o_noise.zw += vec2(max(moments.y - moments.x * moments.x, 0.0) * before.w / (before.w - 1.0), 1.0);
         }

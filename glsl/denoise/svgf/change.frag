@@ -3,10 +3,13 @@
 
 uniform sampler2D t_difference;
 uniform sampler2D t_noise;
+uniform sampler2D t_doubt;
 
 // How many times what the noise makes of them is put down to noise, so that it seldom is taken for a change: the mean squared
-// difference of pixels; that of the means of 25 blocks; the difference of the mean of 9.
-const float PIXELS = 1.3, BLOCKS = 2.0, MEAN = 10.0;
+// difference of pixels; that of the means of 25 blocks; the difference of the mean of 9. And of the resampling's doubt.
+const float PIXELS = 1.2, BLOCKS = 1.3, MEAN = 7.0, DOUBT = 4.0;
+// An error that neighbours share passes the filter over space, noise does not: it counts as much more as that takes of the noise, about.
+const float GAIN = 16.0;
 
 layout(location = 0) out float o_change;    // squared error of the history by the change / variance of a frame's pixel
 
@@ -14,17 +17,21 @@ void main() {
     o_change = 0.0;
     ivec2 block = ivec2(gl_FragCoord.xy), last = textureSize(t_difference, 0) - 1;
     vec4 difference = vec4(0.0), noise = vec4(0.0), near = vec4(0.0);
-    vec2 blocks = vec2(0.0);
+    vec3 blocks = vec3(0.0);
+    vec2 doubt = vec2(0.0);
+    float near_doubt = 0.0;
     for (int i = 0; i < 25; ++i) {
         ivec2 offset = ivec2(i % 5, i / 5) - 2, at = block + offset;
         if (any(lessThan(at, ivec2(0))) || any(greaterThan(at, last))) continue;
         vec4 d = texelFetch(t_difference, at, 0);
         if (d.w <= 0.0) continue;
         bool inner = max(abs(offset.x), abs(offset.y)) < 2;
-        blocks += vec2(d.x * d.x / d.w, 1.0);
+        vec2 q = texelFetch(t_doubt, at, 0).xy;
+        blocks += vec3(d.x * d.x / d.w, 1.0, q.x * q.x / d.w);
+        doubt += q;
         difference += d;
         noise += texelFetch(t_noise, at, 0);
-        if (inner) near += d;
+        if (inner) { near += d; near_doubt += q.x; }
     }
     if (difference.w < 8.0 || difference.y <= 0.0) return;
     // Variance of one pixel in one frame. Over time a change counts as noise, over space fine detail does: the lesser is nearer to it.
@@ -32,12 +39,11 @@ void main() {
     float one = noise.w > 0.5 * difference.w ? min(noise.z / noise.w, over_space) : over_space;
     one = max(one, 1e-4 * difference.y / difference.w);
     float both = one * (1.0 + difference.z / difference.w);    // of new - old, if the light stands still
-    // Resampling alone: its errors run along edges, so that a block's and a neighbourhood's pixels share them.
-    float doubt = noise.y / difference.w;
-    float by_pixels = difference.y / difference.w - PIXELS * both - 4.0 * doubt;
-    // What the filter over space cannot take is the error that neighbours share: a block's counts as many times as it has pixels.
-    float by_blocks = blocks.x / blocks.y - BLOCKS * both - 16.0 * doubt;
-    float by_mean = near.w > 8.0 ? near.x * near.x / near.w - MEAN * both - 36.0 * doubt : 0.0;
-    float change = max(max(by_pixels, by_blocks), max(by_mean, 0.0)) / one;
+    // Besides: what resampling alone may have done, by pixels and by what their errors have in common.
+    float by_pixels = difference.y / difference.w - PIXELS * both - DOUBT * doubt.y / difference.w;
+    // Of means, in units of a pixel's variance.
+    float by_blocks = blocks.x / blocks.y - BLOCKS * both - DOUBT * blocks.z / blocks.y;
+    float by_mean = near.w > 8.0 ? near.x * near.x / near.w - MEAN * both - DOUBT * near_doubt * near_doubt / near.w : 0.0;
+    float change = max(max(by_pixels, by_blocks), max(by_mean, 0.0)) * GAIN / one;
     o_change = change < 1e6 ? change : 1e6;     // also for NaN
 }

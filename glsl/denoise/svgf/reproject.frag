@@ -14,7 +14,7 @@ uniform vec2 u_history_shift;    // uv: of the picture that the history is, agai
 
 in vec2 v_uv;
 layout(location = 0) out vec4 o_color;     // rgb: mean; w: frames in it, 0 = none
-layout(location = 1) out vec4 o_moments;   // xy: of the luminance of single frames; z: squared doubt of the resampling
+layout(location = 1) out vec4 o_moments;   // xy: of the luminance of single frames; z: doubt of the resampling, a luminance
 
 vec3 previous_position(vec2 uv, float depth_m) {
     vec2 xy = ((uv - u_previous_jitter) * 2.0 - 1.0) * u_previous_lens.xy * (u_previous_lens.z == 0.0 ? depth_m : 1.0);
@@ -60,6 +60,7 @@ void main() {
 #endif
     float width = svgf_pixel_width(here.depth_m), total = 0.0, total_inner = 0.0;
     vec4 inner = vec4(0.0);
+    vec2 nearest = vec2(0.0);   // its luminance, its weight
     for (int i = 0; i < 16; ++i) {
         ivec2 k = ivec2(i & 3, i >> 2);
         float w = wx[k.x] * wy[k.y];
@@ -74,6 +75,7 @@ void main() {
         if (!svgf_is_finite(moments.xyxy)) continue;
         vec2 near = mix(1.0 - f, f, vec2(k - 1));
         inner += near.x * near.y * color;
+        if (near.x * near.y > nearest.y) nearest = vec2(svgf_luminance(color.rgb), near.x * near.y);
         o_moments.xy += near.x * near.y * moments;
         total_inner += near.x * near.y;
     }
@@ -82,8 +84,7 @@ void main() {
     o_moments.xy /= total_inner;
     // Where some of the four are missing, the others are all that is known.
     bool whole = total_inner > 0.999 && total > 0.5;
-    // Two ways to read between the texels differ about as much as either is off.
-    float doubt = whole ? svgf_luminance(o_color.rgb / total - inner.rgb) : 0.0;
-    o_moments.z = doubt * doubt;
     o_color = vec4(whole ? o_color.rgb / total : inner.rgb, inner.w);
+    // An edge between texels could as well be anywhere between them: the history is off by about what shifting the nearest one by makes.
+    o_moments.z = nearest.x - svgf_luminance(o_color.rgb);
 }
