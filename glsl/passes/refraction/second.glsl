@@ -11,7 +11,8 @@ uniform sampler2D t_caustics2;
 
 const int SECOND_ITERATIONS = 8;   // of Newton's method, where nothing marches
 
-// For rays that were behind some surface on their way: others are in front of all that the second layer holds. Of both layers, the surface that the ray meets first counts. status: GLC_VIEW_SECOND where only the second layer holds it.
+// For rays that were behind some surface on their way: others are in front of all that the second layer holds. Of both layers, the
+// surface that the ray meets first counts. status: GLC_VIEW_SECOND where only the second layer holds it.
 void look_behind(GlcRasterRay ray, int steps, inout GlcSolve solve, inout float status) {
 #if USE_MARCH
     GlcSolve behind = glc_march_hierarchical(t_bounds2, t_plane2, ray, steps);
