@@ -28,6 +28,7 @@ class DisplacedMesh(LightMapMethod):
 
     name = "displaced_mesh"
     warps = True
+    boxed_splats = True
     summary = "a mesh over water, glass and mirrors as the light sees them, drawn where its light lands"
     paper = "Mayer, Assarsson, Sintorn 2026: Ultrafast Screen-Space Refractions and Caustics via Newton's Method"
     ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {

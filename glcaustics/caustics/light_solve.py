@@ -51,6 +51,7 @@ class LightMapMethod(CausticsMethod):
     }
     flags: ClassVar[tuple[str, ...]] = ("reflect", "dispersion")
     lights_second_layer = True
+    boxed_splats: ClassVar[bool] = False  # True: splats are few and long, and drawn as turned boxes, not as points
     warps: ClassVar[bool] = False  # True: one warped map a view; False: nested cores, each sample drawn in one of them
     option_help: ClassVar[Mapping[str, str]] = {
         "caster_size": "the casters' light view has about this^2 texels, one light sample each (8..8192)",
@@ -337,7 +338,9 @@ class LightMapMethod(CausticsMethod):
         width, height = light.caster.size
         copies = 3 if receiver.view.faces == 6 else 1  # a splat can reach three faces of a cube
         warp = self.warp_define(light, receiver)
-        program = ctx.device.program(f"{SHADERS}/splat", {"RECEIVER_FACES": receiver.view.faces, "WARP": warp})
+        program = ctx.device.program(
+            f"{SHADERS}/splat", {"RECEIVER_FACES": receiver.view.faces, "WARP": warp, "BOX": int(self.boxed_splats)}
+        )
         self.set_warp(program, ctx, light, receiver)
         size = self.map_desc(light, receiver).size
         program.set_all(
@@ -350,7 +353,11 @@ class LightMapMethod(CausticsMethod):
                 "u_map_size": (float(size[0]), float(size[1])),
             }
         )
-        ctx.device.draw_points(program, target, copies * width * height, blend="add")
+        count = copies * width * height
+        if self.boxed_splats:
+            ctx.device.draw_triangles(program, target, 2 * count, blend="add")
+        else:
+            ctx.device.draw_points(program, target, count, blend="add")
 
     def _gather(self, ctx: PassContext, maps: list[tuple[LightSetup, ReceiverView]], layer: str) -> None:
         ctx.target(irradiance_of(layer)).clear(0.0, 0.0, 0.0, 0.0)

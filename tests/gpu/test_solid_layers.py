@@ -1,5 +1,6 @@
 """Light in solids of more than one layer: a bar over a block, one mesh. Beside the bar light enters the block, and
-leaves it where the light's view shows the bar first: one pair of front and back faces has no way out for it, a second has.
+leaves it where the light's view shows the bar first: one pair of front and back faces has no way out for it, a second
+has one.
 """
 
 from __future__ import annotations
