@@ -51,18 +51,19 @@ def photons(scene: Scene, bins: int, frames: int = 4, **options: Any) -> tuple[F
 
 
 def check(image: FloatArray, truth: FloatArray, frame: glc.renderer.Frame, truth_paths: float = math.inf) -> None:
-    """Energy within 0.5 %; RMSE not above that of independent photons of the same number and flux (4 frames, a view of
+    """Energy within 0.5 %; RMSE within 1.2 times that of independent photons of the same number and flux (4 frames, a view of
     2.4 m), and of the truth's own paths if that was drawn too.
     """
     solve = frame.stats["solves"][0]
-    each = solve["flux"] * (1.0 / (4.0 * solve["rays"]) + 1.0 / truth_paths) / (2.4 / len(truth)) ** 2
+    landed = solve["flux_landed"] / (solve["converged"] + solve["bracketed"])  # mean flux of a photon that counts
+    each = landed * (0.25 + solve["rays"] / truth_paths) / (2.4 / len(truth)) ** 2
     noise = math.sqrt(float((truth * each).mean()))
     error = math.sqrt(float(((image - truth) ** 2).mean()))
     print(
         f"sum {image.sum() / truth.sum():.5f}, RMSE {error / truth.mean():.4f}, independent {noise / truth.mean():.4f}"
     )
     assert image.sum() == pytest.approx(truth.sum(), rel=0.005)
-    assert error < noise
+    assert error < 1.2 * noise  # as against Mitsuba: at roughness 0.9 chance alone is 1.16
 
 
 def under_water(light: Light, roughness: float = 0.0, half_m: float = 0.5) -> Scene:
@@ -71,11 +72,13 @@ def under_water(light: Light, roughness: float = 0.0, half_m: float = 0.5) -> Sc
     return scene_of([plane("floor", 3.0, -1.0), sheet("water", half_m, 0.0, water)], [light], from_above(1.2, -1.0))
 
 
-@pytest.mark.parametrize("diameter_deg", [0.0, 12.0])
-def test_a_disc_in_the_sky_through_flat_water(diameter_deg: float) -> None:
-    light = replace(sun(30.0), angular_diameter_rad=math.radians(diameter_deg))
+@pytest.mark.parametrize(("theta_deg", "diameter_deg"), [(30.0, 0.0), (30.0, 12.0), (50.0, 60.0)])
+def test_a_disc_in_the_sky_through_flat_water(theta_deg: float, diameter_deg: float) -> None:
+    """The last one's weights go from 0.3 to 1.7."""
+    light = replace(sun(theta_deg), angular_diameter_rad=math.radians(diameter_deg))
     image, frame = photons(under_water(light), 48)
-    truth = disc_through_flat_water(math.radians(30.0), math.radians(0.5 * diameter_deg), pixel_edges(1.2, 48), 1.0)
+    radius = math.radians(0.5 * diameter_deg)
+    truth = disc_through_flat_water(math.radians(theta_deg), radius, pixel_edges(1.2, 48), 1.0)
     check(image, truth, frame)
 
 
@@ -163,11 +166,12 @@ def slab_by_sampling(
     return total / np.outer(np.diff(edges), np.diff(edges))
 
 
-def test_rough_glass_scatters_at_both_interfaces() -> None:
-    glass = replace(GLASS, roughness=0.3)
-    slab = box("slab", (1.0, 0.03, 1.0), (0.0, 1.515, 0.0), glass)
-    image, frame = photons(scene_of([plane("floor", 3.0), slab], [sun()], from_above(1.2)), 24)
-    truth = slab_by_sampling((0.5, 0.015, 0.5), 0.3, pixel_edges(1.2, 24), 1.5)
+@pytest.mark.parametrize("roughness", [0.3, 0.9])
+def test_rough_glass_scatters_at_both_interfaces(roughness: float) -> None:
+    glass = replace(GLASS, roughness=roughness)
+    slab = box("slab", (1.0, 0.006, 1.0), (0.0, 1.503, 0.0), glass)  # so thin that hardly any light meets a side
+    image, frame = photons(scene_of([plane("floor", 3.0), slab], [sun()], from_above(1.2)), 24, internal_bounces=0)
+    truth = slab_by_sampling((0.5, 0.003, 0.5), roughness, pixel_edges(1.2, 24), 1.5)
     check(image, truth, frame, 1.6e6)
     lost = frame.stats["solves"][0]["flux_lost_by_cause"]
     print("lost", {cause: flux / frame.stats["solves"][0]["flux"] for cause, flux in lost.items()})
