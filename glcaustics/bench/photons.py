@@ -26,6 +26,7 @@ STAGES = {  # of the paper's table, by the passes' names; a pass belongs to the 
 }
 REFLECTED = "photon_trace.trace.reflect"  # of the tracing, what reflected photons take: these march the longest
 MARCHES = ("hierarchical", "dda")
+VIEW_STEPS = 4096  # for both: pixel by pixel, a photon may have to cross the whole picture
 
 
 def photon_options(photons: int, view_size: int, **more: Any) -> dict[str, Any]:
@@ -99,8 +100,8 @@ def stage_table(
     for count in photons:
         samples: dict[str, dict[str, list[float]]] = {march: {} for march in MARCHES}
         landings: dict[str, list[FloatArray]] = {}
-        with _renderer(scene, size, photon_options(count, view_size, march=MARCHES[0]), backend) as ours:
-            with _renderer(scene, size, photon_options(count, view_size, march=MARCHES[1]), backend) as theirs:
+        with _renderer(scene, size, _marched(count, view_size, MARCHES[0]), backend) as ours:
+            with _renderer(scene, size, _marched(count, view_size, MARCHES[1]), backend) as theirs:
                 both = dict(zip(MARCHES, (ours, theirs), strict=True))
                 for number in range(frames + 1):
                     for march, renderer in both.items():
@@ -121,6 +122,10 @@ def stage_table(
             found.append(row | {"view_size": view_size, "frames": frames})
         found[-2]["same_hits"] = same_hits(landings[MARCHES[0]], landings[MARCHES[1]])
     return found
+
+
+def _marched(photons: int, view_size: int, march: str) -> dict[str, Any]:
+    return photon_options(photons, view_size, march=march, view_steps=VIEW_STEPS)
 
 
 def _renderer(scene: Scene, size: tuple[int, int], options: Mapping[str, Any], backend: str) -> Renderer:
