@@ -51,8 +51,8 @@ def photons(scene: Scene, bins: int, frames: int = 4, **options: Any) -> tuple[F
 
 
 def check(image: FloatArray, truth: FloatArray, frame: glc.renderer.Frame, truth_paths: float = math.inf) -> None:
-    """Energy within 0.5 %; RMSE within 1.2 times that of independent photons of the same number and flux (4 frames, a view of
-    2.4 m), and of the truth's own paths if that was drawn too.
+    """Energy within 0.5 %; RMSE within 1.2 times that of independent photons of the same number and flux (4 frames, a
+    view of 2.4 m), and of the truth's own paths if that was drawn too.
     """
     solve = frame.stats["solves"][0]
     landed = solve["flux_landed"] / (solve["converged"] + solve["bracketed"])  # mean flux of a photon that counts
