@@ -14,7 +14,8 @@ from glcaustics.errors import UsageError
 from glcaustics.passes.taa import RADIANCE
 from glcaustics.renderer import plan_frame
 from glcaustics.scene.model import Camera, Scene
-from tests.gpu.feature_scenes import box, plane, scene_of, sun
+from glcaustics.scene.water import Wave, WaveSurface, make_water
+from tests.gpu.feature_scenes import WATER, box, from_above, plane, scene_of, sun
 
 pytestmark = pytest.mark.gpu
 BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
@@ -148,3 +149,22 @@ def test_positions_are_those_of_the_shifted_frame() -> None:
 def test_samples_and_taa_exclude_each_other() -> None:
     with open_renderer(edges(), taa=True) as renderer, pytest.raises(UsageError, match="use one of the two"):
         renderer.render(samples=4)
+
+
+def test_light_that_moves_over_a_floor_is_not_washed_out() -> None:
+    """Caustics that wander over a floor that stands still: the mean over frames must not smear them. Contrast is the
+    standard deviation over the mean, in the middle of the floor.
+    """
+    k = 2.0 * np.pi / 0.5
+    surface = WaveSurface([Wave(2.0 / k**2, k, 0.0, 0.0, k * 0.08, 0.0)])
+    water = make_water("water", WATER, surface, size_m=(2.4, 2.4), resolution=(256, 16), center_m=(0.0, 0.0, 0.0))
+    scene = scene_of([plane("floor", 3.0, -1.0)], [sun()], from_above(1.2, -1.0), waters=(water,))
+    contrast = []
+    for taa in (False, True):
+        with glc.Renderer(
+            scene, (64, 64), "caustic_map", "low", BACKEND, stats=False, specular_view=False, taa=taa
+        ) as renderer:
+            frames = [renderer.render(float(t)).image[16:48, 16:48, 1] for t in range(10)]
+        contrast.append(np.mean([f.std() / f.mean() for f in frames[-3:]]))
+    print(f"contrast {contrast[0]:.3f}, with taa {contrast[1]:.3f}")
+    assert contrast[1] > 0.8 * contrast[0]
