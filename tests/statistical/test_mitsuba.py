@@ -15,12 +15,14 @@ import pytest
 
 from glcaustics.bench.mitsuba_scene import SURE_VARIANT, best_variant
 from glcaustics.bench.mitsuba_seen import seen_radiance
-from glcaustics.bench.mitsuba_truth import PhotonMap, Pinhole, enlarged, mitsuba_reference
+from glcaustics.bench.mitsuba_truth import Halves, PhotonMap, Pinhole, agreement, enlarged, mitsuba_reference
+from glcaustics.bench.mitsuba_view import view_ptracer_reference
 from glcaustics.bench.references import beam_reference
 from glcaustics.bench.store import Store
-from glcaustics.bench.mitsuba_truth import agreement
-from glcaustics.bench.targets import Target, bench_scene, target_of
+from glcaustics.bench.targets import Target, bench_scene, luminance, target_of
+from glcaustics.bench.view_reference import view_reference
 from glcaustics.errors import UsageError
+from glcaustics.scene.load import load_scene
 from glcaustics.scene.model import Camera, Instance, Light, LightKind, Material, Mesh, Scene
 
 MISSING = [name for name in ("mitsuba", "embreex") if importlib.util.find_spec(name) is None]
@@ -147,3 +149,17 @@ def test_a_caustic_seen_through_water_has_the_right_radiance_and_place() -> None
         per_unit[r][:, c][1:7, 1:7].mean() for r in (slice(0, 8), slice(8, 16)) for c in (slice(0, 8), slice(8, 16))
     ]
     assert quarters == pytest.approx([1.0, 3.0, 1.0, 1.0], rel=0.02)
+
+
+def test_beams_at_the_cameras_pixels_and_mitsuba_differ_by_noise_alone(tmp_path: Path) -> None:
+    """Walls and ceiling of `flooded-cornell`, seen directly: the lamp sees no part of them."""
+    store = Store(tmp_path)
+    beams = view_reference(load_scene("flooded-cornell"), 96, 128, store).reduced(32)
+    other = view_ptracer_reference(bench_scene("flooded-cornell"), 32, 1 << 18, store)
+    seen = beams.plain & beams.direct
+    assert 0.4 < seen.mean() < 0.8
+    halves = Halves(luminance(beams.first)[seen][:, None], luminance(beams.second)[seen][:, None])
+    found = agreement(halves, Halves(other.first[seen][:, None], other.second[seen][:, None]))
+    assert found["agree"], found
+    again = view_reference(load_scene("flooded-cornell"), 96, 128, store)
+    assert again.seconds == 0.0 and np.array_equal(again.reduced(32).first, beams.first)
