@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import moderngl
 import numpy as np
 
-from glcaustics.caustics.branches import BRANCH_CODE, REFLECT, SOLID, Branch, branches_of, solve_statistics
+from glcaustics.caustics.branches import BRANCH_CODE, INTERFACE, REFLECT, SOLID, Branch, branches_of, solve_statistics
 from glcaustics.caustics.landing import fit_receivers
 from glcaustics.caustics.map_warp import SEGMENTS, TABLE_ROWS, MapWarp
 from glcaustics.caustics.method import CausticsMethod, irradiance_of
@@ -338,8 +338,9 @@ class LightMapMethod(CausticsMethod):
         width, height = light.caster.size
         copies = 3 if receiver.view.faces == 6 else 1  # a splat can reach three faces of a cube
         warp = self.warp_define(light, receiver)
+        boxed = self.boxed_splats and branch.kind != INTERFACE  # water leaves few and small ones
         program = ctx.device.program(
-            f"{SHADERS}/splat", {"RECEIVER_FACES": receiver.view.faces, "WARP": warp, "BOX": int(self.boxed_splats)}
+            f"{SHADERS}/splat", {"RECEIVER_FACES": receiver.view.faces, "WARP": warp, "BOX": int(boxed)}
         )
         self.set_warp(program, ctx, light, receiver)
         size = self.map_desc(light, receiver).size
@@ -354,7 +355,7 @@ class LightMapMethod(CausticsMethod):
             }
         )
         count = copies * width * height
-        if self.boxed_splats:
+        if boxed:
             ctx.device.draw_triangles(program, target, 2 * count, blend="add")
         else:
             ctx.device.draw_points(program, target, count, blend="add")
