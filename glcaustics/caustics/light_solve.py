@@ -239,8 +239,12 @@ class LightMapMethod(CausticsMethod):
             if self.layers(light) == 2:
                 light_view.declare_caster_layers(graph, light)
             else:
-                share = 100.0 * self._trapped.get(light.index, 0.0)
-                because = f"{share:.2g} % of the light in solids finds no way out without a second pair of layers"
+                share = self._trapped.get(light.index)
+                because = (
+                    "a coarse light decides before the first frame whether the solids need a second pair of layers"
+                    if share is None
+                    else f"{100.0 * share:.2g} % of the light in solids finds no way out without a second pair of layers"
+                )
                 graph.leave_out(f"caster_front2{light.resource('')}", because)
         else:
             graph.leave_out(f"caster_back{light.resource('')}", "nothing in the scene is a solid with two interfaces")
