@@ -243,7 +243,7 @@ class LightMapMethod(CausticsMethod):
                 because = (
                     "a coarse light decides before the first frame whether the solids need a second pair of layers"
                     if share is None
-                    else f"{100.0 * share:.2g} % of the light in solids finds no way out without a second pair of layers"
+                    else f"{100.0 * share:.2g} % of the light in solids finds no way out by one pair of layers"
                 )
                 graph.leave_out(f"caster_front2{light.resource('')}", because)
         else:
