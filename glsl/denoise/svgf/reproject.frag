@@ -61,8 +61,10 @@ void main() {
     float width = svgf_pixel_width(here.depth_m), total = 0.0, total_inner = 0.0;
     vec4 inner = vec4(0.0);
     vec2 nearest = vec2(0.0);   // its luminance, its weight
-    for (int i = 0; i < 16; ++i) {
-        ivec2 k = ivec2(i & 3, i >> 2);
+    // A view that stands still needs one texel; llvmpipe leaves a loop when all pixels are done with it.
+    ivec2 moves = ivec2(greaterThan(f, vec2(1e-3))), columns = 1 + 3 * moves;
+    for (int i = 0; i < columns.x * columns.y; ++i) {
+        ivec2 k = ivec2(i % columns.x, i / columns.x) + 1 - moves;
         float w = wx[k.x] * wy[k.y];
         if (abs(w) < 1e-4) continue;
         ivec2 texel = ivec2(base) + k - 1;
