@@ -112,6 +112,7 @@ class Ptracer:
             self._scenes.append(mi.load_dict(parts))
         self._depth = interfaces + 2
         self.seconds = 0.0  # spent on passes of the full depth since somebody set this to 0
+        self.processor_seconds = 0.0  # the same, of all threads
 
     def render(self, photons: int, seed: int, *, direct: bool = False) -> FloatArray:
         """Caustic irradiance (H, W), luminance, by at least `photons` photons in passes averaged in float64.
@@ -126,9 +127,10 @@ class Ptracer:
         while done < spp:
             count = min(each, spp - done)
             run = seed * SEED_STRIDE + done // each
-            start = time.perf_counter()
+            start = time.perf_counter(), time.process_time()
             image = self._pass(self._depth, count, run)
-            self.seconds += time.perf_counter() - start
+            self.seconds += time.perf_counter() - start[0]
+            self.processor_seconds += time.process_time() - start[1]
             if not direct:
                 image = image - self._pass(2, count, run)
             total += image * count

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 import time
 from collections.abc import Callable
 from typing import Any
@@ -33,14 +34,15 @@ class PtracerPeer:
 
     def measure(self, photons: int) -> tuple[dict[str, Any], FloatArray]:
         """A row without its errors, and the irradiance map, of the last run."""
-        values, image = [], np.zeros(0)
+        values, processor, image = [], [], np.zeros(0)
         for run in range(RUNS):
-            self._tracer.seconds = 0.0
+            self._tracer.seconds = self._tracer.processor_seconds = 0.0
             image = self._tracer.render(photons, seed=31 + run)
             values.append(1e3 * self._tracer.seconds)
-        return self._row("ptracer", self._tracer.photons(photons), values), image
+            processor.append(1e3 * self._tracer.processor_seconds)
+        return self._row("ptracer", self._tracer.photons(photons), values, processor), image
 
-    def _row(self, method: str, photons: int, values: list[float]) -> dict[str, Any]:
+    def _row(self, method: str, photons: int, values: list[float], processor: list[float]) -> dict[str, Any]:
         return {
             "scene": self._scene,
             "tool": "mitsuba",
@@ -50,17 +52,19 @@ class PtracerPeer:
             "photons": photons,
             "variant": self._tracer.variant,
             "time_ms": summary(values, "wall clock"),
+            "processor_ms": statistics.median(processor),
             "first_frame_ms": self.setup_ms,
         }
 
     def denoised(self, row: dict[str, Any], image: FloatArray) -> tuple[dict[str, Any], FloatArray]:
         """The same run with Open Image Denoise after it (its time added)."""
-        values, clean = [], image
+        values, processor, clean = [], [], image
         for _ in range(RUNS):
-            start = time.perf_counter()
+            start = time.perf_counter(), time.process_time()
             clean = denoise(image)
-            values.append(row["time_ms"]["median"] + 1e3 * (time.perf_counter() - start))
-        return self._row("ptracer+oidn", row["photons"], values), clean
+            values.append(row["time_ms"]["median"] + 1e3 * (time.perf_counter() - start[0]))
+            processor.append(row["processor_ms"] + 1e3 * (time.process_time() - start[1]))
+        return self._row("ptracer+oidn", row["photons"], values, processor), clean
 
 
 def has_denoiser() -> bool:

@@ -18,6 +18,7 @@ from glcaustics.bench.mitsuba_view import ViewPtracer, view_ptracer_reference
 from glcaustics.bench.peers import PtracerPeer, has_denoiser
 from glcaustics.bench.photons import (
     KEPT_FRAMES,
+    METHOD,
     QUALITY,
     photon_options,
     picture_with,
@@ -28,6 +29,7 @@ from glcaustics.bench.plan import PhotonPlan, Plan
 from glcaustics.bench.store import scene_key
 from glcaustics.bench.targets import bench_scene, luminance
 from glcaustics.bench.view_reference import ViewReference, view_reference
+from glcaustics.caustics.registry import METHODS
 from glcaustics.scene.load import load_scene
 from glcaustics.scene.model import Scene
 
@@ -123,6 +125,7 @@ class PhotonsPart:
         """Of so many photons and the plan's light views; None: of the quality as it is."""
         p = self.settings
         options = {} if photons is None else photon_options(photons, p.view_size)
+        options = {name: value for name, value in options.items() if METHODS[METHOD].ladder[QUALITY].get(name) != value}
         what = f"{QUALITY} quality" if photons is None else f"{photons} photons"
 
         def make() -> Measured:
@@ -193,13 +196,14 @@ class PhotonsPart:
         rows: list[dict[str, Any]] = []
         clean_rows: list[dict[str, Any]] = []
         for row, image in self._peer_rows(scene):
-            row = row | {"errors": {"rrmse": _masked(halves, image, mask)}}
+            clock = {"median": row["processor_ms"]}  # of all threads: a busy machine slows one tool and not the other
+            row = row | {"errors": {"rrmse": _masked(halves, image, mask)}, "time_ms": clock}
             (clean_rows if "oidn" in row["method"] else rows).append(row)
         ours = []
         document, arrays = self._frames(scene, p.filtered, None)
         for number in self._kept_frames():
             error = _masked(halves, luminance(arrays[f"frame {number}"]), mask)
-            entry = compare(error, number * document["frame_ms"], rows, clean_rows)
+            entry = compare(error, number * document["processor_ms"], rows, clean_rows)
             ours.append(entry | {"frames": number, "quality": QUALITY})
         return {
             "pixels": p.filtered,

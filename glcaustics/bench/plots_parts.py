@@ -22,7 +22,9 @@ def part_plots(report: Report) -> dict[str, bytes]:
 def _photons(one: Mapping[str, Any]) -> bytes:
     equal = one["equal"]
     figure, axes = log_axes(
-        f"{one['scene']}, what the eye sees directly", "time, ms (wall clock)", "relative RMSE of irradiance"
+        f"{one['scene']}, what the eye sees directly",
+        "time, ms (processor time, all threads)",
+        "relative RMSE of irradiance",
     )
     label = f"photon_trace {equal['ours'][0]['quality']}" if equal["ours"] else ""
     curves = [

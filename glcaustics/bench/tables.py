@@ -131,7 +131,7 @@ def _equal_time_table(one: Mapping[str, Any]) -> Table:
         ]
     head = ("tool", "ms", "rel. RMSE", "faster than ptracer", "than ptracer + OIDN")
     pixels = f"{equal['share']:.0%} of {equal['pixels']}^2 pixels"
-    note = f"on the {pixels} that ptracer can show: seen directly, one surface alone"
+    note = f"ms by processor time, all threads; on the {pixels} that ptracer can show: seen directly, one surface alone"
     return Table(f"{one['scene']}: at equal error on what the eye sees directly", head, rows, note)
 
 
