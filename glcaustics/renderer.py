@@ -239,7 +239,7 @@ def plan_frame(
     Raises:
         UsageError: unknown method, quality, AOV or option.
     """
-    chosen = pick(_named(scene, method), scene)
+    chosen = pick(_named(scene, method))
     setup = FrameSetup.analyse(
         scene, size, resolve_options(chosen, quality, options or {}), transmissive_shadows=chosen is not None
     )
@@ -316,7 +316,7 @@ class Renderer:
                 f"the target framebuffer is {shown}, the picture {self.size[0]}x{self.size[1]}",
                 remedy="make both the same size",
             )
-        self._chosen = pick(self.method_name, scene)
+        self._chosen = pick(self.method_name)
         resolved = resolve_options(self._chosen, quality, options or {})
         self._method = self._chosen() if self._chosen else None
         self._setup = FrameSetup.analyse(

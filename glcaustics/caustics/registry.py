@@ -9,7 +9,6 @@ from glcaustics.caustics.displaced_mesh import DisplacedMesh
 from glcaustics.caustics.method import CausticsMethod
 from glcaustics.caustics.photon_trace import PhotonTrace
 from glcaustics.errors import UsageError
-from glcaustics.scene.model import OpticalKind, Scene
 
 METHODS: dict[str, type[CausticsMethod]] = {
     "caustic_map": CausticMap,
@@ -19,21 +18,14 @@ METHODS: dict[str, type[CausticsMethod]] = {
 
 NONE = "none"  # caustics off: light passes through water and glass as if they were not there
 AUTO = "auto"
+# What "auto" takes. Relative RMSE of the irradiance and processor time of whole frames, quality medium, llvmpipe, each
+# pair from one run: peer-pool 0.0096 in 138 ms against the caustic map's 0.0157 in 153 ms; pool 0.075, 140 ms against
+# 0.086, 140 ms; glass-sphere 0.056, 301 ms against 0.187, 365 ms; metal-ring 0.087, 179 ms against 0.548, 129 ms.
+BEST = DisplacedMesh
 
 
-def best_for(scene: Scene) -> type[CausticsMethod]:
-    """What "auto" takes: the displaced mesh for water, the caustic map for solids and mirrors.
-
-    Relative RMSE and whole frames, each pair from one run on llvmpipe, quality medium. Water: peer-pool 0.0087 in 152
-    ms against the map's 0.044 in 175 ms. Solids: glass-sphere beside its focus 0.044 in 576 ms against 0.015 in 236 ms,
-    glass-bunny 0.65 in 787 ms against 0.61 in 272 ms. Mirrors: a nephroid 0.013 in 122 ms against 0.014 in 87 ms.
-    """
-    kinds = {instance.optical_kind for instance in scene.instances_at(0.0)}
-    return DisplacedMesh if OpticalKind.INTERFACE in kinds else CausticMap
-
-
-def pick(name: str, scene: Scene | None = None) -> type[CausticsMethod] | None:
-    """The method of a name; None for "none". "auto" takes what is best for the scene (any scene: the mesh).
+def pick(name: str) -> type[CausticsMethod] | None:
+    """The method of a name; None for "none".
 
     Raises:
         UsageError: no such method.
@@ -41,7 +33,7 @@ def pick(name: str, scene: Scene | None = None) -> type[CausticsMethod] | None:
     if name == NONE:
         return None
     if name == AUTO:
-        return best_for(scene) if scene is not None else DisplacedMesh
+        return BEST
     if name not in METHODS:
         near = difflib.get_close_matches(name, [*METHODS, NONE, AUTO], n=1)
         raise UsageError(

@@ -77,7 +77,7 @@ def test_the_caustic_lies_where_optics_puts_it(glb: Path) -> None:
         scene, (640, 480), backend=BACKEND, specular_view=False, aovs=("caustic_irradiance", "position_ws", "depth_m")
     ) as renderer:
         frame = renderer.render(time=0.0)
-    assert frame.stats["method"] == "caustic_map" and frame.stats["quality"] == "medium"
+    assert frame.stats["method"] == "displaced_mesh" and frame.stats["quality"] == "medium"
     image, count = binned(frame)
     reference = truth()
     seen = count >= 2
