@@ -88,6 +88,21 @@ def test_cascade_agrees_with_pixel_exact_marching() -> None:
     assert np.median(difference) < 0.01 and np.percentile(difference, 95) < 0.1
 
 
+def test_what_the_camera_does_not_see_is_continued_alike_by_both_marches() -> None:
+    """Rays that end behind the pool's near rim: the surface that they saw last, to the sample. Where a march knew that
+    only to a cell, the rim showed stripes, while all that counts solved pixels stayed as it was.
+    """
+    pictures = {}
+    for solver in ("dda", "cascade"):
+        frame = render("pool", solver, refraction_steps=16384)
+        pictures[solver] = frame.ldr.astype(int)
+        hidden = frame.aov["solve_status"] == 7
+    assert hidden.sum() > 200
+    apart = np.abs(pictures["dda"] - pictures["cascade"]).max(axis=-1)[hidden]
+    print("behind the rim, more than 8 of 255 apart:", (apart > 8).mean())
+    assert (apart > 8).mean() < 0.05
+
+
 def test_from_under_water_snells_window_is_where_it_must_be() -> None:
     """Looking straight up: beyond the critical angle the surface is a mirror (4), within it one sees out."""
     base = glc.load_scene("pool").view_at(0.0)
