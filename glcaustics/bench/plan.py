@@ -130,6 +130,7 @@ QUICK = replace(
     seconds=(1.0, 4.0),
     frames=4,
     photon=PhotonPlan(
+        scenes=("flooded-cornell",),
         side=256,
         view_size=768,
         photons=(1 << 19,),
@@ -139,7 +140,7 @@ QUICK = replace(
         peer_photons=(1 << 17, 1 << 19, 1 << 21),
         validate=1 << 20,
     ),
-    mesh=MeshPlan(cells=512),
+    mesh=MeshPlan(cells=384),
     eye=EyePlan(
         views=2,
         size=(320, 180),

@@ -130,7 +130,7 @@ _BENCH_EPILOG = (
 
 def _add_bench_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("-o", "--output", default="bench-report", metavar="DIR", help="default: bench-report")
-    command.add_argument("--quick", action="store_true", help="four scenes, small, in three to four minutes")
+    command.add_argument("--quick", action="store_true", help="four scenes, small, in about four minutes")
     command.add_argument(
         "--parts", nargs="+", action="extend", metavar="NAME", help="caustics, photons, mesh, eye, seen (default: all)"
     )
