@@ -94,8 +94,8 @@ def declare(graph: FrameGraph, setup: FrameSetup, noisy: str, clean: str, desc: 
         PassDecl(
             "svgf.variance",
             {ESTIMATE: color, GUIDE: TextureDesc("r32f", size)},
-            _variance,
-            reads=(COLOR, MOMENTS, DEPTH, NORMAL),
+            lambda ctx: _variance(ctx, noisy),
+            reads=(noisy, COLOR, MOMENTS, DEPTH, NORMAL),
             note="how far that mean may be off",
         )
     )
@@ -201,8 +201,13 @@ def _accumulate(ctx: PassContext, noisy: str) -> None:
     _draw(ctx, "accumulate", (COLOR, MOMENTS), values, BLOCK=BLOCK, ADAPTIVE=int(adaptive))
 
 
-def _variance(ctx: PassContext) -> None:
-    values = {**_geometry(ctx), "t_color": ctx.texture(COLOR), "t_moments": ctx.texture(MOMENTS)}
+def _variance(ctx: PassContext, noisy: str) -> None:
+    values = {
+        **_geometry(ctx),
+        "t_noisy": ctx.texture(noisy),
+        "t_color": ctx.texture(COLOR),
+        "t_moments": ctx.texture(MOMENTS),
+    }
     _draw(ctx, "variance", (ESTIMATE, GUIDE), values)
 
 

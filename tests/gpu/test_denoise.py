@@ -11,6 +11,7 @@ import pytest
 from scipy.ndimage import binary_dilation, binary_erosion
 
 import glcaustics as glc
+from glcaustics.bench.targets import bench_scene
 from glcaustics.errors import UsageError
 from glcaustics.metrics import surface_flicker
 from glcaustics.scene.model import Camera, Scene
@@ -91,6 +92,24 @@ def test_filtered_is_nearer_to_the_truth_than_one_frame(light_px: float, pan_px:
     assert filtered.mean() == pytest.approx(truth.mean(), rel=0.01)
     if light_px:
         assert abs(lag[1]) > 0.4
+
+
+def test_a_focus_is_no_noise() -> None:
+    """A ball's focus is tens of times as bright as what is around it, but no photon is. While the history is too short
+    to know its own variance, that of the photons' number keeps the filter from spreading the focus.
+    """
+    ball = bench_scene("glass-sphere")
+
+    def frames(count: int, photons: int, **options: bool) -> list[FloatArray]:
+        return render(ball, [0.0] * count, photons, **options)
+
+    truth = np.mean(frames(6, 1 << 19, denoise=False), axis=0)
+    noisy, filtered = frames(1, 1 << 16, denoise=False)[0], frames(4, 1 << 16)
+    error = [float(np.sqrt(np.mean((x - truth) ** 2)) / truth.mean()) for x in (noisy, filtered[0], filtered[3])]
+    print("one frame, filtered, filtered after four:", np.round(error, 3))
+    assert truth.max() > 30.0 * truth.mean()
+    assert error[1] < error[0] and error[2] < 0.6 * error[0]
+    assert filtered[0].mean() == pytest.approx(truth.mean(), rel=0.01)
 
 
 def test_panning_flickers_at_most_half_as_much_as_with_an_exponential_mean() -> None:
