@@ -13,7 +13,7 @@ BIB = (ROOT / "glsl" / "REFERENCES.bib").read_text(encoding="utf-8")
 KINDS = ("*.glsl", "*.frag", "*.vert", "*.py", "*.md")
 SOURCES = sorted(p for d in ("glsl", "glcaustics", "docs") for kind in KINDS for p in (ROOT / d).rglob(kind))
 NAME = r"(?:[Vv]an (?:de )?)?[A-Z][A-Za-z'-]+"
-CITATION = re.compile(rf"({NAME})((?:(?:,? and |,? & |, ){NAME})*)(?: et al\.)?,? \(?((?:19|20)\d\d)(?!-\d|\d)")
+CITATION = re.compile(rf"({NAME})((?:(?:,? and |,? & |, ){NAME})*)(?: et al\.)?,? \(?((?:19|20)\d\d)(?!-\d|\d|x\d)")
 NOT_A_NAME = {"LLVM", "Mesa", "Python", "Debian"}
 
 
