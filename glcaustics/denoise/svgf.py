@@ -58,7 +58,7 @@ def declare(graph: FrameGraph, setup: FrameSetup, noisy: str, clean: str, desc: 
     Args:
         setup: its options hold those of `OPTION_HELP`.
         noisy: resource, rgba32f: an unbiased estimate in rgb at the camera's opaque pixels, with noise that is
-            independent from frame to frame; alpha is not looked at.
+            independent from frame to frame; alpha: samples in the pixel, 0 where that is unknown.
         clean: resource to write. desc: of both.
 
     Of the frame it reads depth, normal and motion of the G-buffer, and its own last results.
