@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from glcaustics.bench.analysis import cost_ms, fit_power, pareto
-from glcaustics.bench.cells import Cells
+from glcaustics.bench.cells import Part
 from glcaustics.bench.equal_error import equal_error
 from glcaustics.bench.luxcore_peer import SCENES as LUXCORE_SCENES
 from glcaustics.bench.luxcore_peer import has_luxcore, luxcore_rows
@@ -30,19 +30,14 @@ FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(eq=False)
-class CausticsPart:
+class CausticsPart(Part):
     """Measures the plan's scenes, methods, qualities and sizes.
 
     Raises:
         UsageError: a scene without a target, sizes that do not divide, or a package that is missing.
     """
 
-    plan: Plan
-    cells: Cells
-    peers: bool = True
     rows: list[dict[str, Any]] = field(default_factory=list)
-    images: dict[str, FloatArray] = field(default_factory=dict)
-    pictures: dict[str, npt.NDArray[np.uint8]] = field(default_factory=dict)
 
     def run(self) -> dict[str, Any]:
         """Measure everything; the report's keys of this part."""

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from glcaustics.bench.machine import code_key, machine
+from glcaustics.bench.plan import Plan
 from glcaustics.bench.progress import Progress
 from glcaustics.bench.store import Arrays, Store, default_cache, digest
 
@@ -56,3 +61,17 @@ class Cells:
     def close(self) -> None:
         """Ends the progress line."""
         self._progress.close()
+
+
+@dataclass(eq=False)
+class Part:
+    """One part of a run: its `run` measures and returns the report's keys.
+
+    `peers`: Mitsuba's too. `images` (H, W): irradiance by label; `pictures` (H, W, 3): 8-bit sRGB; both for the page.
+    """
+
+    plan: Plan
+    cells: Cells
+    peers: bool = True
+    images: dict[str, npt.NDArray[np.float64]] = field(default_factory=dict)
+    pictures: dict[str, npt.NDArray[np.uint8]] = field(default_factory=dict)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from glcaustics.bench.cells import Cells, Measured
+from glcaustics.bench.cells import Measured, Part
 from glcaustics.bench.eye_cost import eye_cost
 from glcaustics.bench.eye_rays import PUBLISHED, eye_study, seeded_cameras
 from glcaustics.bench.light_rays import light_study
@@ -27,15 +27,8 @@ def count_steps(plan: Plan) -> int:
     return (3 + plan.eye.cost_views) * len(plan.eye.scenes)
 
 
-@dataclass(eq=False)
-class EyePart:
+class EyePart(Part):
     """Runs the instruments of eye and light rays over the eye plan's scenes."""
-
-    plan: Plan
-    cells: Cells
-    peers: bool = True
-    images: dict[str, FloatArray] = field(default_factory=dict)
-    pictures: dict[str, npt.NDArray[np.uint8]] = field(default_factory=dict)
 
     @property
     def settings(self) -> EyePlan:

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from glcaustics import metrics
-from glcaustics.bench.cells import Cells, Measured
+from glcaustics.bench.cells import Measured, Part
 from glcaustics.bench.machine import instrument_key
 from glcaustics.bench.mitsuba_truth import Halves
 from glcaustics.bench.plan import MeshPlan, Plan
@@ -54,15 +54,8 @@ def inner(image: FloatArray) -> FloatArray:
     return image[INNER:-INNER, INNER:-INNER]
 
 
-@dataclass(eq=False)
-class MeshPart:
+class MeshPart(Part):
     """Measures the mesh plan's sizes, (mesh, map) each."""
-
-    plan: Plan
-    cells: Cells
-    peers: bool = True
-    images: dict[str, FloatArray] = field(default_factory=dict)
-    pictures: dict[str, npt.NDArray[np.uint8]] = field(default_factory=dict)
 
     @property
     def settings(self) -> MeshPlan:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from glcaustics import metrics
-from glcaustics.bench.cells import Cells, Measured
+from glcaustics.bench.cells import Measured, Part
 from glcaustics.bench.equal_error import compare
 from glcaustics.bench.machine import instrument_key, versions
 from glcaustics.bench.measure import flip_of
@@ -47,14 +47,9 @@ def count_steps(plan: Plan, peers: bool) -> int:
 
 
 @dataclass(eq=False)
-class PhotonsPart:
+class PhotonsPart(Part):
     """Measures the photon plan's scenes."""
 
-    plan: Plan
-    cells: Cells
-    peers: bool = True
-    images: dict[str, FloatArray] = field(default_factory=dict)
-    pictures: dict[str, npt.NDArray[np.uint8]] = field(default_factory=dict)
     _kept: dict[str, Measured] = field(default_factory=dict)
 
     @property

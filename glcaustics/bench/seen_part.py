@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from glcaustics import metrics
-from glcaustics.bench.cells import Cells, Measured
+from glcaustics.bench.cells import Measured, Part
 from glcaustics.bench.equal_error import compare
 from glcaustics.bench.machine import instrument_key, versions
 from glcaustics.bench.measure import Timing, frame_ms, summary
@@ -63,15 +63,8 @@ def seen_scene(name: str, target: Target) -> Scene:
     return replace(scene, instances=instances, sky=Sky(black, black, black), camera=camera, camera_at=None)
 
 
-@dataclass(eq=False)
-class SeenPart:
+class SeenPart(Part):
     """Measures the seen plan's scene."""
-
-    plan: Plan
-    cells: Cells
-    peers: bool = True
-    images: dict[str, FloatArray] = field(default_factory=dict)
-    pictures: dict[str, npt.NDArray[np.uint8]] = field(default_factory=dict)
 
     @property
     def settings(self) -> SeenPlan:
