@@ -121,7 +121,7 @@ def resolve_options(method: type[CausticsMethod] | None, quality: str, options: 
     if method is not None:
         method.validate(resolved)
         if method.noisy:
-            svgf.check_options(resolved)
+            svgf.check(resolved)
     return resolved
 
 

@@ -16,13 +16,13 @@ from glcaustics.caustics.branches import BRANCH_CODE, INTERFACE, REFLECT, SOLID,
 from glcaustics.caustics.landing import fit_receivers
 from glcaustics.caustics.map_warp import SEGMENTS, TABLE_ROWS, MapWarp
 from glcaustics.caustics.method import CausticsMethod, irradiance_of
-from glcaustics.errors import UsageError
 from glcaustics.gpu import Device, Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes import light_view
 from glcaustics.passes.frame import FrameSetup, FrameState, LightSetup, PassContext, ReceiverView
 from glcaustics.passes.gbuffer import LAYERS
 from glcaustics.passes.light_views import light_uniforms
+from glcaustics.passes.options import check_options
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.scene.model import OpticalKind
 
@@ -81,17 +81,7 @@ class LightMapMethod(CausticsMethod):
 
     @classmethod
     def validate(cls, options: Mapping[str, Any]) -> None:
-        for name, (low, high) in cls.ranges.items():
-            value = options[name]
-            if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-                remedy = f"give a number from {low} to {high}"
-                raise UsageError(f"option {name} is {value!r}", where=cls.name, remedy=remedy)
-        if options["estimate"] not in ESTIMATES:
-            remedy = f"use one of {', '.join(ESTIMATES)}"
-            raise UsageError(f"option estimate is {options['estimate']!r}", where=cls.name, remedy=remedy)
-        for name in cls.flags:
-            if not isinstance(options[name], bool):
-                raise UsageError(f"option {name} is {options[name]!r}", where=cls.name, remedy="use true or false")
+        check_options(options, cls.name, numbers=cls.ranges, choices={"estimate": ESTIMATES}, flags=cls.flags)
 
     # -- declaration --------------------------------------------------------------------------------------------------
 

@@ -1,11 +1,11 @@
-"""Options of photon tracing: the ladder of quality, ranges, defaults and help."""
+"""Options of photon tracing: ladder of quality, ranges, defaults and help; those of the filter are in `denoise.svgf`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-from glcaustics.errors import UsageError
+from glcaustics.passes.options import check_options
 
 LADDER: Mapping[str, Mapping[str, Any]] = {
     quality: {
@@ -34,10 +34,8 @@ RANGES: Mapping[str, tuple[int, int]] = {
     "march_steps": (1, 512),
     "view_steps": (8, 16384),
     "internal_bounces": (0, 32),
-    "denoise_passes": (1, 8),
-    "history_frames": (1, 1024),
 }
-SHARES = ("luminance_cutoff", "roughness_cutoff")  # numbers from 0 to 1
+SHARES: Mapping[str, tuple[float, float]] = {"luminance_cutoff": (0, 1), "roughness_cutoff": (0, 1)}
 CHOICES = {"fresnel": ("split", "chance"), "march": ("hierarchical", "dda")}
 FLAGS = ("reflect", "dispersion", "denoise", "adaptive")
 HELP: Mapping[str, str] = {
@@ -56,8 +54,6 @@ HELP: Mapping[str, str] = {
     "reflect": "follow light that water and glass throw back (true, false)",
     "dispersion": "refract red, green and blue apart where a material disperses (true, false)",
     "denoise": "filter over time and space (true, false); without, the estimate is unbiased and noisy",
-    "denoise_passes": "a-trous passes of the filter (1..8)",
-    "history_frames": "longest memory of the filter (1..1024)",
 }
 DEFAULTS: Mapping[str, Any] = {
     "fresnel": "split",
@@ -68,25 +64,9 @@ DEFAULTS: Mapping[str, Any] = {
     "reflect": True,
     "dispersion": True,
     "denoise": True,
-    "history_frames": 64,
 }
 
 
 def check(options: Mapping[str, Any], where: str) -> None:
     """Raise UsageError for an option out of its range; `where`: whose options they are."""
-    for name, (low, high) in RANGES.items():
-        value = options[name]
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            remedy = f"give a whole number from {low} to {high}"
-            raise UsageError(f"option {name} is {value!r}", where=where, remedy=remedy)
-    for name in SHARES:
-        value = options[name]
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 <= value <= 1.0:
-            raise UsageError(f"option {name} is {value!r}", where=where, remedy="give a number from 0 to 1")
-    for name, words in CHOICES.items():
-        if options[name] not in words:
-            remedy = f"use one of {', '.join(words)}"
-            raise UsageError(f"option {name} is {options[name]!r}", where=where, remedy=remedy)
-    for name in FLAGS:
-        if not isinstance(options[name], bool):
-            raise UsageError(f"option {name} is {options[name]!r}", where=where, remedy="use true or false")
+    check_options(options, where, whole=RANGES, numbers=SHARES, choices=CHOICES, flags=FLAGS)

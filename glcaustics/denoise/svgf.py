@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from glcaustics.errors import UsageError
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes.frame import FrameSetup, PassContext
+from glcaustics.passes.options import check_options
 
 SHADERS = "denoise/svgf"
 COLOR, MOMENTS = "svgf.color", "svgf.moments"  # both histories: mean and its length in frames; luminance and its square
@@ -36,20 +36,9 @@ OPTION_HELP: Mapping[str, str] = {
 EXPONENTIAL_FRAMES = 5  # 1 / alpha (Schied et al. 2017, sec. 5)
 
 
-def check_options(options: Mapping[str, Any]) -> None:
+def check(options: Mapping[str, Any]) -> None:
     """Raise UsageError for an option of the filter that is out of its range."""
-    for name, (low, high) in RANGES.items():
-        value = options[name]
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise UsageError(
-                f"option {name} is {value!r}", where="denoise", remedy=f"give a whole number from {low} to {high}"
-            )
-    if options["denoise_history"] not in HISTORIES:
-        raise UsageError(
-            f"option denoise_history is {options['denoise_history']!r}",
-            where="denoise",
-            remedy=f"use one of {', '.join(HISTORIES)}",
-        )
+    check_options(options, "denoise", whole=RANGES, choices={"denoise_history": HISTORIES})
 
 
 def declare(graph: FrameGraph, setup: FrameSetup, noisy: str, clean: str, desc: TextureDesc) -> None:
