@@ -1,4 +1,4 @@
-"""Options of photon tracing: ladder of quality, ranges, defaults and help; those of the filter are in `denoise.svgf`."""
+"""Options of photon tracing: ladder of quality, ranges, defaults and help; the filter's are in `denoise.svgf`."""
 
 from __future__ import annotations
 
