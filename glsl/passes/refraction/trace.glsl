@@ -1,4 +1,5 @@
 #include "common/ray_march.glsl"
+#include "common/way_clear.glsl"
 #include "common/intersect_box.glsl"
 #include "interface/raster.glsl"
 #include "interface/sky.glsl"
