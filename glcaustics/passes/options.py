@@ -1,4 +1,4 @@
-"""What the options of every frame mean, one line each with unit and range (their values: `renderer.BASE_LADDER`), and
+"""What the options of every frame mean, one line each with unit and range (their values: `renderer.options.BASE_LADDER`), and
 the check that options of methods and filters go through.
 """
 

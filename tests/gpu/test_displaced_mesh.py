@@ -178,7 +178,7 @@ def test_drawing_costs_little_more_than_a_trivial_shader() -> None:
         renderer.render()
         device, runner, setup = renderer.device, renderer._runner, renderer._setup
         assert runner is not None
-        ctx, frame = device.ctx, renderer._frame_state(0.0)
+        ctx, frame = device.ctx, renderer._sequence.state(renderer.scene, 0.0)
         steps = runner.plan.steps
         last = next(i for i, step in enumerate(steps) if ".draw." in step.name)
         branch = renderer._method._branches[0][0]  # type: ignore[union-attr]

@@ -68,7 +68,7 @@ def test_methods_names_paper_and_ladder(asked: list[Any], capsys: pytest.Capture
 
 def test_every_option_of_the_frame_has_its_help() -> None:
     from glcaustics.passes.options import OPTION_HELP
-    from glcaustics.renderer import BASE_LADDER
+    from glcaustics.renderer.options import BASE_LADDER
 
     for options in BASE_LADDER.values():
         assert set(options) == set(OPTION_HELP)
