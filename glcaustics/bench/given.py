@@ -13,7 +13,8 @@ from glcaustics.caustics.method import IRRADIANCE, QUALITIES, CausticsMethod
 from glcaustics.caustics.registry import METHODS
 from glcaustics.errors import UsageError
 from glcaustics.graph import FrameGraph, PassDecl
-from glcaustics.passes.frame import FrameSetup, PassContext
+from glcaustics.passes.context import PassContext
+from glcaustics.passes.frame import FrameSetup
 
 NAME = "given irradiance"
 

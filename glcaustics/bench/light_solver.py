@@ -13,7 +13,8 @@ from glcaustics.caustics.registry import METHODS
 from glcaustics.errors import UsageError
 from glcaustics.gpu import Device
 from glcaustics.graph import FrameGraph
-from glcaustics.passes.frame import CameraState, FrameSetup, FrameState, LightSetup
+from glcaustics.passes.camera import CameraState
+from glcaustics.passes.frame import FrameSetup, FrameState, LightSetup
 from glcaustics.passes.geometry import GpuScene
 from glcaustics.passes.light_views import LightView
 from glcaustics.passes.runner import PlanRunner

@@ -20,7 +20,8 @@ from glcaustics.gpu import Device, create_device
 from glcaustics.graph import FrameGraph
 from glcaustics.optics.refract import refract
 from glcaustics.passes import gbuffer
-from glcaustics.passes.frame import CameraState, FrameSetup, FrameState
+from glcaustics.passes.camera import CameraState
+from glcaustics.passes.frame import FrameSetup, FrameState
 from glcaustics.passes.geometry import GpuScene
 from glcaustics.passes.raster import raster_uniforms
 from glcaustics.passes.runner import PlanRunner

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from glcaustics.passes.frame import BELOW, BESIDE, FrameSetup, LightSetup
+from glcaustics.passes.frame import FrameSetup, LightSetup
 from glcaustics.passes.geometry import TRANSMISSIVE_KINDS
+from glcaustics.passes.receiver_views import BELOW, BESIDE
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.scene.model import OpticalKind
 

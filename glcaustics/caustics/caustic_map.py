@@ -17,7 +17,9 @@ import numpy as np
 from glcaustics.caustics.branches import REFLECT, Branch
 from glcaustics.caustics.light_solve import SPLAT_SIGMA, LightMapMethod
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes.frame import CORE, FrameSetup, LightSetup, PassContext, ReceiverView
+from glcaustics.passes.context import PassContext
+from glcaustics.passes.frame import FrameSetup, LightSetup
+from glcaustics.passes.receiver_views import CORE, ReceiverView
 
 SHADERS = "caustics/caustic_map"
 

@@ -15,7 +15,9 @@ from glcaustics.caustics.branches import REFLECT, Branch, read_rgba32f
 from glcaustics.caustics.light_solve import SPLAT_SIGMA, LightMapMethod
 from glcaustics.gpu import Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext, ReceiverView
+from glcaustics.passes.context import PassContext
+from glcaustics.passes.frame import FrameSetup, LightSetup
+from glcaustics.passes.receiver_views import ReceiverView
 from glcaustics.passes.runner import PlanRunner
 
 SHADERS = "caustics/displaced_mesh"

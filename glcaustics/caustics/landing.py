@@ -17,9 +17,11 @@ from glcaustics.caustics.branches import NO_EXIT, SOLID, branches_of, read_rgba3
 from glcaustics.caustics.map_warp import MapWarp, fit_warp
 from glcaustics.gpu import Device
 from glcaustics.graph import FrameGraph
-from glcaustics.passes.frame import CORE, FrameSetup, FrameState, LightSetup, ReceiverView, receiver_views
+from glcaustics.passes.fit_view import fit_view
+from glcaustics.passes.frame import FrameSetup, FrameState, LightSetup
 from glcaustics.passes.geometry import boxes_of, points_of
-from glcaustics.passes.light_views import LightView, fit_view
+from glcaustics.passes.light_views import LightView
+from glcaustics.passes.receiver_views import CORE, ReceiverView, receiver_views
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.scene.model import FloatArray, Light, OpticalKind
 

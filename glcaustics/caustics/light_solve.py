@@ -19,10 +19,12 @@ from glcaustics.caustics.method import CausticsMethod, irradiance_of
 from glcaustics.gpu import Device, Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes import light_view
-from glcaustics.passes.frame import FrameSetup, FrameState, LightSetup, PassContext, ReceiverView
+from glcaustics.passes.context import PassContext
+from glcaustics.passes.frame import FrameSetup, FrameState, LightSetup
 from glcaustics.passes.gbuffer import LAYERS
 from glcaustics.passes.light_views import light_uniforms
 from glcaustics.passes.options import check_options
+from glcaustics.passes.receiver_views import ReceiverView
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.scene.model import OpticalKind
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from glcaustics.caustics.branches import Branch
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes.frame import PassContext
+from glcaustics.passes.context import PassContext
 from glcaustics.passes.light_views import LightView
 
 SHADERS = "caustics/photon_trace"

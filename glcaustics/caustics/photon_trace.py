@@ -21,7 +21,8 @@ from glcaustics.caustics.photon_stats import landing_of, photon_statistics
 from glcaustics.caustics.photon_strata import photon_grid, sequence
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes import depth_chain, light_view
-from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext
+from glcaustics.passes.context import PassContext
+from glcaustics.passes.frame import FrameSetup, LightSetup
 from glcaustics.passes.light_views import light_uniforms
 from glcaustics.passes.raster import raster_uniforms
 from glcaustics.passes.runner import PlanRunner

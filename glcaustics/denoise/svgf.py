@@ -13,7 +13,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes.frame import FrameSetup, PassContext
+from glcaustics.passes.context import PassContext
+from glcaustics.passes.frame import FrameSetup
 from glcaustics.passes.options import check_options
 
 SHADERS = "denoise/svgf"

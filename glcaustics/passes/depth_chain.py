@@ -5,7 +5,8 @@ from __future__ import annotations
 from functools import partial
 
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes.frame import FrameSetup, PassContext
+from glcaustics.passes.context import PassContext
+from glcaustics.passes.frame import FrameSetup
 
 
 def _cells(size: tuple[int, int], texels: int) -> tuple[int, int]:

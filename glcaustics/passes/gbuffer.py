@@ -8,8 +8,9 @@ import numpy as np
 
 from glcaustics.gpu import Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
+from glcaustics.passes.context import PassContext
 from glcaustics.passes.eye_medium import holds
-from glcaustics.passes.frame import FrameSetup, PassContext
+from glcaustics.passes.frame import FrameSetup
 from glcaustics.passes.geometry import SPECULAR_KINDS, DrawItem
 from glcaustics.scene.model import FloatArray, OpticalKind
 

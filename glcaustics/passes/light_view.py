@@ -8,9 +8,11 @@ from typing import Any
 
 from glcaustics.gpu import Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes.frame import BELOW, BESIDE, FrameSetup, LightSetup, PassContext, ReceiverView
+from glcaustics.passes.context import PassContext
+from glcaustics.passes.frame import FrameSetup, LightSetup
 from glcaustics.passes.geometry import DrawItem
 from glcaustics.passes.light_views import LightView
+from glcaustics.passes.receiver_views import BELOW, BESIDE, ReceiverView
 from glcaustics.scene.model import OpticalKind
 
 SHADER = "passes/light_view/light_view"

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext
+from glcaustics.passes.context import PassContext
+from glcaustics.passes.frame import FrameSetup, LightSetup
 from glcaustics.passes.light_views import light_uniforms
 from glcaustics.scene.model import OpticalKind
 

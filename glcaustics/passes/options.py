@@ -1,5 +1,5 @@
-"""What the options of every frame mean, one line each with unit and range (their values: `renderer.options.BASE_LADDER`), and
-the check that options of methods and filters go through.
+"""What the options of every frame mean, one line each with unit and range, and the check that options of methods and
+filters go through. Their values: `renderer.options.BASE_LADDER`.
 """
 
 from __future__ import annotations

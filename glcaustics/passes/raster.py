@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from glcaustics.passes.frame import CameraState
+from glcaustics.passes.camera import CameraState
 from glcaustics.scene.model import FloatArray
 
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from glcaustics.errors import UsageError
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
+from glcaustics.passes.context import PassContext
 from glcaustics.passes.eye_medium import EyeMediumFinder
-from glcaustics.passes.frame import FrameSetup, PassContext
+from glcaustics.passes.frame import FrameSetup
 from glcaustics.passes.geometry import KIND_INDEX, SPECULAR_KINDS, boxes_of
 from glcaustics.passes.lighting import sky_uniforms
 from glcaustics.passes.raster import raster_from_world, raster_uniforms

@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from glcaustics.gpu import Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext
+from glcaustics.passes.context import PassContext
+from glcaustics.passes.fit_view import fit_view
+from glcaustics.passes.frame import FrameSetup, LightSetup
 from glcaustics.passes.geometry import DrawItem, boxes_of, points_of
-from glcaustics.passes.light_views import fit_view, light_uniforms
+from glcaustics.passes.light_views import light_uniforms
 from glcaustics.scene.model import OpticalKind
 
 SHADER = "passes/rsm/rsm"

@@ -6,7 +6,8 @@ import moderngl
 
 from glcaustics.gpu import Device
 from glcaustics.graph import Plan, TextureDesc
-from glcaustics.passes.frame import FrameSetup, FrameState, PassContext
+from glcaustics.passes.context import PassContext
+from glcaustics.passes.frame import FrameSetup, FrameState
 
 
 class PlanRunner:

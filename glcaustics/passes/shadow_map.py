@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes.frame import FrameSetup, LightSetup, PassContext
+from glcaustics.passes.context import PassContext
+from glcaustics.passes.frame import FrameSetup, LightSetup
 
 SHADER = "passes/shadow_map/shadow_map"
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes.frame import FrameSetup, PassContext
+from glcaustics.passes.context import PassContext
+from glcaustics.passes.frame import FrameSetup
 
 RADIANCE = "taa.radiance"
 PERIOD = 16  # frames after which the camera's shifts repeat; also the longest mean

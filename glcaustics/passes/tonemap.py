@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
-from glcaustics.passes.frame import FrameSetup, PassContext
+from glcaustics.passes.context import PassContext
+from glcaustics.passes.frame import FrameSetup
 
 LOOK_POWER = 1.25  # AgX "punchy": power and saturation after the base contrast
 LOOK_SATURATION = 1.25

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from glcaustics.caustics.method import IRRADIANCE
 from glcaustics.errors import UsageError
-from glcaustics.passes.frame import CameraState
+from glcaustics.passes.camera import CameraState
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.renderer.readback import read_floats
 

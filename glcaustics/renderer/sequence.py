@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from glcaustics.gpu import Device
+from glcaustics.passes.camera import CameraState
 from glcaustics.passes.eye_medium import EyeMediumFinder
-from glcaustics.passes.frame import CameraState, FrameSetup, FrameState
+from glcaustics.passes.frame import FrameSetup, FrameState
 from glcaustics.passes.geometry import GpuScene
 from glcaustics.scene.model import FloatArray, LightKind, Scene
 

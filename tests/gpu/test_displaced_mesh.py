@@ -21,7 +21,7 @@ import glcaustics as glc
 from glcaustics.optics.beams import HeightField, beam_irradiance, peer_pool_field
 from glcaustics.optics.fresnel import fresnel_dielectric
 from glcaustics.optics.pixels import box_filter
-from glcaustics.passes.frame import PassContext
+from glcaustics.passes.context import PassContext
 from glcaustics.scene.model import Camera, Scene
 
 pytestmark = pytest.mark.gpu

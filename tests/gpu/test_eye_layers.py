@@ -14,7 +14,8 @@ from glcaustics.errors import UsageError
 from glcaustics.gpu import Device
 from glcaustics.graph import FrameGraph
 from glcaustics.passes import gbuffer
-from glcaustics.passes.frame import CameraState, FrameSetup, FrameState
+from glcaustics.passes.camera import CameraState
+from glcaustics.passes.frame import FrameSetup, FrameState
 from glcaustics.passes.geometry import GpuScene, boxes_of
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.renderer import Frame, plan_frame, resolve_options

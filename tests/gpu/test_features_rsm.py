@@ -13,7 +13,8 @@ from glcaustics.caustics.registry import pick
 from glcaustics.gpu import Device
 from glcaustics.graph import FrameGraph
 from glcaustics.passes import rsm
-from glcaustics.passes.frame import CameraState, FrameSetup, FrameState
+from glcaustics.passes.camera import CameraState
+from glcaustics.passes.frame import FrameSetup, FrameState
 from glcaustics.passes.geometry import GpuScene
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.renderer import resolve_options

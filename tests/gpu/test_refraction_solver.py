@@ -14,7 +14,7 @@ import numpy.typing as npt
 import pytest
 
 from glcaustics.gpu import Device, Program, ShaderLoader, glsl_root
-from glcaustics.passes.frame import CameraState
+from glcaustics.passes.camera import CameraState
 from glcaustics.passes.raster import raster_from_world
 from glcaustics.scene.model import Camera
 

@@ -17,7 +17,7 @@ import pytest
 from glcaustics.bench.eye_rays import eye_convergence
 from glcaustics.bench.solver_variants import HIT, Buffers, VariantBench, compare, ray_from_px, scene_buffers
 from glcaustics.gpu import Device
-from glcaustics.passes.frame import CameraState
+from glcaustics.passes.camera import CameraState
 from glcaustics.scene.model import Camera, Instance, Scene
 from tests.gpu.feature_scenes import BACKEND, WHITE, scene_of, sheet, sun
 from tests.gpu.feature_scenes import plane as ground

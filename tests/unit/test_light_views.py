@@ -7,17 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from glcaustics.passes.light_views import (
-    CUBE_FORWARD,
-    MAX_TANGENT,
-    LightView,
-    best_turn,
-    cube_view,
-    depth_range,
-    fit_size,
-    fit_view,
-    light_uniforms,
-)
+from glcaustics.passes.fit_view import MAX_TANGENT, best_turn, cube_view, depth_range, fit_size, fit_view
+from glcaustics.passes.light_views import CUBE_FORWARD, LightView, light_uniforms
 from glcaustics.scene.model import Light, LightKind
 
 RANDOM = np.random.default_rng(7)
