@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from glcaustics.bench.measure import summary
-from glcaustics.bench.mitsuba_scene import unit
 from glcaustics.bench.scene_export import world_normals
 from glcaustics.bench.targets import Target, casters, luminance
 from glcaustics.errors import UsageError
+from glcaustics.passes.view_math import unit
 from glcaustics.scene.model import Scene
 
 FloatArray = npt.NDArray[np.float64]

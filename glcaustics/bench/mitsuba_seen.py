@@ -7,7 +7,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from glcaustics.bench.mitsuba_scene import best_variant, camera_sensor, look, mitsuba, shapes
+from glcaustics.bench.mitsuba_camera import camera_sensor, look
+from glcaustics.bench.mitsuba_shapes import shapes
+from glcaustics.bench.mitsuba_variant import best_variant, mitsuba
 from glcaustics.bench.targets import Target, luminance
 from glcaustics.scene.model import Camera, Scene
 

@@ -10,12 +10,16 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from glcaustics.bench.mitsuba_scene import aimed_lights, best_variant, film, look, mitsuba, shapes
+from glcaustics.bench.mitsuba_camera import film, look
+from glcaustics.bench.mitsuba_lights import aimed_lights
+from glcaustics.bench.mitsuba_shapes import shapes
+from glcaustics.bench.mitsuba_variant import best_variant, mitsuba
 from glcaustics.bench.scene_export import beam_scene
 from glcaustics.bench.store import Store, digest, scene_key
 from glcaustics.bench.targets import Target, casters, luminance
@@ -242,7 +246,7 @@ class Pinhole:
         eye = (float(low[0] + to_x * step), target.pinhole_ws[1], float(low[2] + to_z * step))
         return Pinhole(eye, eye[1] - target.centre_ws[1], half * step, 2 * half, half - to_z, half - to_x)
 
-    def sensor(self, mi: Any) -> dict[str, Any]:
+    def sensor(self, mi: ModuleType) -> dict[str, Any]:
         """Mitsuba's camera."""
         return {
             "type": "perspective",

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from glcaustics.bench.mitsuba_scene import best_variant, camera_sensor
+from glcaustics.bench.mitsuba_camera import camera_sensor
 from glcaustics.bench.mitsuba_truth import MITSUBA_VERSION, Halves, Ptracer, larger_scene
+from glcaustics.bench.mitsuba_variant import best_variant
 from glcaustics.bench.store import Store, digest, scene_key
 from glcaustics.scene.model import Scene
 

@@ -20,9 +20,9 @@ from glcaustics.bench.cells import Measured, Part
 from glcaustics.bench.equal_error import compare
 from glcaustics.bench.machine import instrument_key, versions
 from glcaustics.bench.measure import Timing, frame_ms, summary
-from glcaustics.bench.mitsuba_scene import best_variant
 from glcaustics.bench.mitsuba_seen import seen_radiance
 from glcaustics.bench.mitsuba_truth import Halves, PhotonMap
+from glcaustics.bench.mitsuba_variant import best_variant
 from glcaustics.bench.peers import denoise, has_denoiser
 from glcaustics.bench.plan import Plan, SeenPlan
 from glcaustics.bench.references import beam_reference

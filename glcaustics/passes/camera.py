@@ -13,7 +13,11 @@ from glcaustics.scene.model import Camera, FloatArray
 
 @dataclass(eq=False)
 class CameraState:
-    """Matrices of one camera at one time, column-vector form; uniforms of `interface/camera.glsl`."""
+    """Matrices of one camera at one time, (4, 4) float64 in column-vector form.
+
+    `lens`: tangents of the half angles, or half extents in metres (orthographic), along x and y; 1 if orthographic; 0.
+    `jitter_uv`: shift of the picture as a part of its size.
+    """
 
     world_from_camera: FloatArray
     camera_from_world: FloatArray
@@ -38,22 +42,16 @@ class CameraState:
         """
         world_from_camera = np.asarray(camera.world_from_camera, np.float64)
         camera_from_world = np.linalg.inv(world_from_camera)
-        corners = np.array(
-            [[bounds_ws[i, 0], bounds_ws[j, 1], bounds_ws[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-        )
-        depth = -(corners @ camera_from_world[2, :3] + camera_from_world[2, 3])
-        extent = float(np.linalg.norm(bounds_ws[1] - bounds_ws[0]))
-        far = max(float(depth.max()), 1e-3 * extent) * 1.001 + 1e-3 * extent
-        aspect = size[0] / size[1]
+        half_height = camera.ymag_m if camera.orthographic else float(np.tan(0.5 * camera.yfov_rad))
+        lens = (half_height * (size[0] / size[1]), half_height)
+        nearest, farthest, extent = _depths_m(camera_from_world, bounds_ws)
+        far = max(farthest, 1e-3 * extent) * 1.001 + 1e-3 * extent
         if camera.orthographic:
-            near = float(depth.min()) - 1e-3 * extent
-            lens = (camera.ymag_m * aspect, camera.ymag_m)
+            near = nearest - 1e-3 * extent
             projection = orthographic(-lens[0], lens[0], -lens[1], lens[1], near, far)
         else:
-            tangent = float(np.tan(0.5 * camera.yfov_rad))
-            lens = (tangent * aspect, tangent)
             boxes = bounds_ws[None] if boxes_ws is None or len(boxes_ws) == 0 else boxes_ws
-            near = max(float(depth.min()) * 0.999, min(_near_m(world_from_camera, lens, boxes), 0.5 * far), 1e-7 * far)
+            near = max(nearest * 0.999, min(_near_m(world_from_camera, lens, boxes), 0.5 * far), 1e-7 * far)
             projection = perspective(-lens[0], lens[0], -lens[1], lens[1], near, far)
         jitter_uv = (jitter_px[0] / size[0], jitter_px[1] / size[1])
         shift = np.eye(4)
@@ -68,6 +66,7 @@ class CameraState:
         )
 
     def uniforms(self) -> dict[str, Any]:
+        """Uniforms of `interface/camera.glsl`."""
         forward = -unit(self.world_from_camera[:3, 2])
         return {
             "u_world_from_camera": self.world_from_camera,
@@ -78,6 +77,15 @@ class CameraState:
             "u_eye_ws": tuple(self.world_from_camera[:3, 3]),
             "u_eye_direction": (*forward, 1.0 if self.orthographic else 0.0),
         }
+
+
+def _depths_m(camera_from_world: FloatArray, bounds_ws: FloatArray) -> tuple[float, float, float]:
+    """Least and greatest depth of a box (2, 3) along the camera's axis, and the box's diagonal; metres."""
+    corners = np.array(
+        [[bounds_ws[i, 0], bounds_ws[j, 1], bounds_ws[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+    )
+    depth = -(corners @ camera_from_world[2, :3] + camera_from_world[2, 3])
+    return float(depth.min()), float(depth.max()), float(np.linalg.norm(bounds_ws[1] - bounds_ws[0]))
 
 
 def _near_m(world_from_camera: FloatArray, lens: tuple[float, float], boxes_ws: FloatArray) -> float:
@@ -95,7 +103,6 @@ def _near_m(world_from_camera: FloatArray, lens: tuple[float, float], boxes_ws: 
     inside = 5e-4 * np.linalg.norm(high - low, axis=1)
     near = np.maximum(0.999 * np.maximum(start, away * corner), np.where(away > 0.0, 0.0, inside))
     near = np.where(reach > 0.0, near, np.inf)
-    touching = 2e-4 * float(
-        np.quantile(np.linalg.norm(high - low, axis=1), 0.25, method="lower")
-    )  # the eye on a surface
+    diagonals = np.linalg.norm(high - low, axis=1)
+    touching = 2e-4 * float(np.quantile(diagonals, 0.25, method="lower"))  # the eye on a surface
     return max(float(near.min()), touching)

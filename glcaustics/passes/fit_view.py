@@ -62,7 +62,7 @@ def fit_view(
 
 def _fit_directional(light: Light, wanted: _Wanted) -> LightView:
     points = wanted.points_ws
-    forward = unit(np.asarray(light.direction_ws, np.float64))
+    forward = unit(light.direction_ws)
     right, up = basis(forward)
     turn = best_turn(points @ right, points @ up)
     right, up = math.cos(turn) * right + math.sin(turn) * up, math.cos(turn) * up - math.sin(turn) * right
@@ -82,7 +82,7 @@ def _fit_frustum(light: Light, wanted: _Wanted, nearest_m: float | None) -> Ligh
     position = np.asarray(light.position_ws, np.float64)
     cone = math.tan(light.outer_cone_rad) if light.kind is LightKind.SPOT and light.outer_cone_rad < 1.5 else math.inf
     points = wanted.points_ws
-    forward = unit(np.asarray(light.direction_ws, np.float64)) if cone <= MAX_TANGENT else light_axis(light, points)
+    forward = unit(light.direction_ws) if cone <= MAX_TANGENT else light_axis(light, points)
     right, up = basis(forward)
     tangents = _tangents(points - position, right, up, forward, cone)
     if tangents is None:
@@ -127,10 +127,8 @@ def cube_view(light: Light, texels: int, depths_ws: FloatArray, nearest_m: float
     far = float(np.linalg.norm(depths_ws - position, axis=1).max()) * 1.01
     near = 1e-3 * far if nearest_m is None else min(max(0.999 * nearest_m / math.sqrt(3.0), 1e-7 * far), 0.5 * far)
     projection = perspective(-1, 1, -1, 1, near, far)
-    matrices = tuple(
-        projection @ view_from_world(np.cross(f, up), up, f, position)
-        for f, up in zip(CUBE_FORWARD, CUBE_UP, strict=True)
-    )
+    axes = zip(CUBE_FORWARD, CUBE_UP, strict=True)
+    matrices = tuple(projection @ view_from_world(np.cross(f, up), up, f, position) for f, up in axes)
     right, up = basis(CUBE_FORWARD[3])
     size = (3 * tile, 2 * tile)
     return LightView(

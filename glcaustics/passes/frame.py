@@ -150,4 +150,5 @@ class FrameState:
     history_camera: CameraState | None = None  # of the last picture drawn, shifted or not: what histories were seen by
 
     def uniforms(self) -> dict[str, Any]:
+        """Uniforms of `interface/camera.glsl`."""
         return self.camera.uniforms()

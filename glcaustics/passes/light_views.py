@@ -44,7 +44,7 @@ class LightView:
     def light_vec4(self) -> tuple[float, float, float, float]:
         """What the shaders call `light`: direction of travel with w = 0, or position with w = 1."""
         if self.light.kind is LightKind.DIRECTIONAL:
-            x, y, z = unit(np.asarray(self.light.direction_ws, np.float64))
+            x, y, z = unit(self.light.direction_ws)
             return float(x), float(y), float(z), 0.0
         x, y, z = self.light.position_ws
         return float(x), float(y), float(z), 1.0
@@ -86,7 +86,7 @@ class LightView:
 
 def light_uniforms(light: Light) -> dict[str, Any]:
     """Uniforms of `interface/light.glsl`."""
-    direction = unit(np.asarray(light.direction_ws, np.float64))
+    direction = unit(light.direction_ws)
     intensity = np.asarray(light.color, np.float64) * light.intensity
     is_directional = light.kind is LightKind.DIRECTIONAL
     cone = (0.0, 1.0)

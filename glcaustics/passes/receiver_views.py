@@ -66,7 +66,7 @@ def light_below(interfaces: list[Instance], light: Light) -> tuple[Light, tuple[
     if high - low > 0.25 * float(np.linalg.norm(np.ptp(points, axis=0))):
         return light, None
     if light.kind is LightKind.DIRECTIONAL:
-        above = float(unit(np.asarray(light.direction_ws, np.float64)) @ normal) < 0.0
+        above = float(unit(light.direction_ws) @ normal) < 0.0
     else:
         height = float(np.asarray(light.position_ws) @ normal)
         above = height > high
@@ -82,7 +82,7 @@ def light_below(interfaces: list[Instance], light: Light) -> tuple[Light, tuple[
 
 def _refracted(light: Light, normal: FloatArray, eta: float) -> Light:
     """A directional light behind a plane; `eta`: index behind it over that before; `normal` against the light."""
-    d = unit(np.asarray(light.direction_ws, np.float64))
+    d = unit(light.direction_ws)
     cos_i = max(-float(d @ normal), 1e-3)
     k = 1.0 - (1.0 - cos_i * cos_i) / (eta * eta)
     if k <= 0.0:

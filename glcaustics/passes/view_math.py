@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from glcaustics.scene.model import FloatArray
 
 
-def unit(v: FloatArray) -> FloatArray:
-    """v / |v|; v (3,) must not be zero."""
-    return v / np.linalg.norm(v)
+def unit(vector: npt.ArrayLike) -> FloatArray:
+    """The vector (3,) at length 1; it must not be zero."""
+    v = np.asarray(vector, np.float64)
+    return np.asarray(v / np.linalg.norm(v))
 
 
 def basis(forward: FloatArray) -> tuple[FloatArray, FloatArray]:

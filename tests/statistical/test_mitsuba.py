@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glcaustics.bench.mitsuba_scene import SURE_VARIANT, best_variant
 from glcaustics.bench.mitsuba_seen import seen_radiance
 from glcaustics.bench.mitsuba_truth import Halves, PhotonMap, Pinhole, agreement, enlarged, mitsuba_reference
+from glcaustics.bench.mitsuba_variant import SURE_VARIANT, best_variant
 from glcaustics.bench.mitsuba_view import view_ptracer_reference
 from glcaustics.bench.references import beam_reference
 from glcaustics.bench.store import Store

@@ -13,8 +13,9 @@ import numpy.typing as npt
 import pytest
 
 import glcaustics as glc
-from glcaustics.bench.mitsuba_scene import DISC_POINTS, aimed_lights, best_variant, mitsuba
+from glcaustics.bench.mitsuba_lights import DISC_POINTS, aimed_lights
 from glcaustics.bench.mitsuba_truth import PhotonMap
+from glcaustics.bench.mitsuba_variant import best_variant, mitsuba
 from glcaustics.bench.targets import Target
 from glcaustics.errors import UsageError
 from glcaustics.scene.model import Instance, Light, LightKind, Material, Scene
