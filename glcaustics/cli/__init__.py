@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from glcaustics.cli.bench import bench_command
 from glcaustics.cli.compare import compare_command
 from glcaustics.cli.doctor import doctor_command
-from glcaustics.cli.listing import methods_command, plan_command, scenes_command
+from glcaustics.cli.listing import plan_command, scenes_command
+from glcaustics.cli.methods import methods_command
 from glcaustics.cli.parser import build_parser
 from glcaustics.cli.render import render_command
 from glcaustics.errors import GlcError

@@ -1,4 +1,4 @@
-"""`glcaustics plan`, `scenes` and `methods`: what would run and what there is. No OpenGL."""
+"""`glcaustics plan` and `scenes`: what would run and what there is. No OpenGL."""
 
 from __future__ import annotations
 
@@ -29,23 +29,4 @@ def scenes_command(args: argparse.Namespace) -> int:
     for name, purpose, licence in rows:
         print(f"{name:<{width}}  {purpose}")
         print(f"{'':<{width}}  licence: {licence}")
-    return 0
-
-
-def methods_command(args: argparse.Namespace) -> int:
-    """Prints every caustics method with its paper and its quality ladder."""
-    from glcaustics.caustics.registry import METHODS
-    from glcaustics.passes.options import OPTION_HELP
-
-    for name, method in METHODS.items():
-        print(
-            f"{name}\n  {method.summary}\n  paper: {method.paper}\n  quality ladder (--quality; override with --set):"
-        )
-        for quality, options in method.ladder.items():
-            print(f"    {quality:<10} " + "  ".join(f"{key}={value}" for key, value in options.items()))
-    print("auto\n  The method that the scene names, else the renderer's choice.")
-    print("none\n  No caustics: direct light alone.")
-    print("with every method (--set)")
-    for option, meaning in OPTION_HELP.items():
-        print(f"    {option:<22} {meaning}")
     return 0

@@ -39,7 +39,8 @@ def build_parser(handlers: Mapping[str, Callable[[argparse.Namespace], int]]) ->
     _add_frame_options(plan)
     plan.add_argument("--dot", action="store_true", help="print the frame graph for graphviz instead of the table")
     add("scenes", "list the built-in scenes")
-    add("methods", "list the caustics methods, their papers and quality ladders")
+    methods = add("methods", "list the caustics methods, or show one's paper, quality ladder and options")
+    methods.add_argument("name", nargs="?", metavar="NAME", help="a method of the list, 'auto' or 'none'")
     compare = add("compare", "print every error measure between two pictures, and map where the error is")
     compare.add_argument("reference", metavar="REFERENCE", help="a .png, .npz or .exr file")
     compare.add_argument("test", metavar="TEST", help="the file to judge, of the same size")
@@ -86,7 +87,7 @@ def _add_frame_options(command: argparse.ArgumentParser) -> None:
         default=[],
         dest="settings",
         metavar="KEY=VALUE",
-        help="an option that the quality ladder would choose, see methods; may be repeated",
+        help="an option that the quality ladder would choose, see 'glcaustics methods NAME'; may be repeated",
     )
 
 

@@ -9,7 +9,7 @@ from glcaustics.caustics.method import QUALITIES, CausticsMethod
 from glcaustics.denoise import svgf
 from glcaustics.errors import UsageError
 from glcaustics.passes import gbuffer, refraction
-from glcaustics.passes.options import check_options
+from glcaustics.passes.options import OPTION_HELP, check_options
 
 BASE_LADDER: dict[str, dict[str, Any]] = {
     quality: {
@@ -50,6 +50,13 @@ def default_options(method: type[CausticsMethod] | None, quality: str) -> dict[s
         if method.noisy:
             options = {**svgf.DEFAULTS, **options}
     return options
+
+
+def option_help(method: type[CausticsMethod] | None) -> dict[str, str]:
+    """One line with unit and range for each of `default_options`: the method's own, its filter's, every frame's."""
+    if method is None:
+        return dict(OPTION_HELP)
+    return {**method.option_help, **(svgf.OPTION_HELP if method.noisy else {}), **OPTION_HELP}
 
 
 def resolve_options(method: type[CausticsMethod] | None, quality: str, options: Mapping[str, Any]) -> dict[str, Any]:

@@ -45,7 +45,7 @@ class Renderer:
         aovs: names of `AOVS` to deliver.
         specular_view: whether the eye sees specular surfaces; without, AOVs are those of the receivers behind them.
         seed: of everything random.
-        options: single options on top of the ladder, see `glcaustics methods`.
+        options: single options on top of the ladder, see `glcaustics methods NAME`.
         stats: read solves back and count them.
         taa: anti-aliasing over time: the camera is shifted by parts of a pixel from frame to frame, and `image` and
             `ldr` are means over the last frames, followed along the motion. AOVs are those of the shifted frame.

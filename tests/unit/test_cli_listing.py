@@ -4,39 +4,36 @@ from __future__ import annotations
 
 import json
 import re
-import sys
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from glcaustics import cli
+from glcaustics.caustics import photon_options
+from glcaustics.caustics.light_solve import ESTIMATES
+from glcaustics.caustics.method import QUALITIES
+from glcaustics.caustics.registry import AUTO, METHODS, NONE, pick
 from glcaustics.cli import doctor
+from glcaustics.denoise import svgf
+from glcaustics.errors import UsageError
+from glcaustics.passes.refraction import SOLVERS
+from glcaustics.renderer.options import default_options, option_help, resolve_options
 from glcaustics.scene.load import builtin_scenes
 
-METHOD = SimpleNamespace(
-    summary="Splats light on what it hits.",
-    paper="Shah, Konttinen, Pattanaik 2007",
-    ladder={"draft": {"map_size": 128}, "medium": {"map_size": 512, "estimate": "hybrid"}},
-)
+CHOICES = {"refraction": SOLVERS, "estimate": ESTIMATES, **photon_options.CHOICES, "denoise_history": svgf.HISTORIES}
 
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
-    """Puts fakes in the place of the registry and the planner; returns what the planner is asked."""
+    """Puts a fake in the place of the planner; returns what it is asked."""
     calls: list[tuple[Any, ...]] = []
 
     def plan_frame(scene: Any, *rest: Any, options: dict[str, Any]) -> SimpleNamespace:
         calls.append((scene.name, *rest, options))
         return SimpleNamespace(explain=lambda: "the table", to_dot=lambda: "digraph {}")
 
-    for name, members in {
-        "glcaustics.renderer": {"AOVS": {"depth_m": "distance"}, "plan_frame": plan_frame},
-        "glcaustics.caustics.registry": {"METHODS": {"caustic_map": METHOD}},
-    }.items():
-        module = ModuleType(name)
-        vars(module).update(members)
-        monkeypatch.setitem(sys.modules, name, module)
+    monkeypatch.setattr("glcaustics.renderer.plan_frame", plan_frame)
     return calls
 
 
@@ -58,20 +55,55 @@ def test_plan_refuses_an_unknown_scene(asked: list[Any], capsys: pytest.CaptureF
     assert asked == []
 
 
-def test_methods_names_paper_and_ladder(asked: list[Any], capsys: pytest.CaptureFixture[str]) -> None:
+def test_methods_is_a_line_a_method(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["methods"]) == 0
+    listed, _, hint = capsys.readouterr().out.partition("\n\n")
+    assert [line.split()[0] for line in listed.splitlines()] == [*METHODS, AUTO, NONE]
+    assert all(method.summary in listed for method in METHODS.values())
+    assert "glcaustics methods NAME" in hint
+
+
+@pytest.mark.parametrize("name", [*METHODS, AUTO, NONE])
+def test_methods_describes_one_with_every_option(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["methods", name]) == 0
     out = capsys.readouterr().out
-    assert "Shah, Konttinen, Pattanaik 2007" in out
-    assert "medium     map_size=512  estimate=hybrid" in out
-    assert re.search(r"^ +depth_layers +2: eye rays that end behind", out, re.MULTILINE)
+    method = pick(name)
+    options, meanings = default_options(method, "medium"), option_help(method)
+    assert (method.paper if method else NONE) in out
+    for option, value in options.items():
+        written = str(value).lower() if isinstance(value, bool) else value
+        assert re.search(rf"^ +{option}={written} +{re.escape(meanings[option])}$", out, re.MULTILINE), option
+        ladder = [str(default_options(method, quality)[option]) for quality in QUALITIES]
+        row = re.search(rf"^ +{option} +{' +'.join(ladder)}$", out, re.MULTILINE)
+        assert (row is not None) == (len(set(ladder)) > 1), option
 
 
-def test_every_option_of_the_frame_has_its_help() -> None:
-    from glcaustics.passes.options import OPTION_HELP
-    from glcaustics.renderer.options import BASE_LADDER
+def test_methods_refuses_an_unknown_name_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["methods", "caustics_map"]) == 2
+    out, error = capsys.readouterr()
+    assert out == "" and error.count("\n") == 1
+    assert "caustics_map" in error and "did you mean caustic_map?" in error
 
-    for options in BASE_LADDER.values():
-        assert set(options) == set(OPTION_HELP)
+
+@pytest.mark.parametrize("name", [*METHODS, NONE])
+def test_the_ranges_in_the_help_are_those_that_are_checked(name: str) -> None:
+    method = pick(name)
+    for option, meaning in option_help(method).items():
+        if span := re.search(r"\((\d+)\.\.(\d+)", meaning):
+            low, high = int(span[1]), int(span[2])
+            good, bad = [low, high], [low - 1, high + 1, "many", True]
+        elif "(true, false" in meaning:
+            good, bad = [True, False, "true", "false"], [0, 1, "yes"]
+        elif span := re.search(r"\((\d), (\d)\)$", meaning):
+            good, bad = [int(span[1]), int(span[2])], [int(span[1]) - 1, int(span[2]) + 1]
+        else:
+            good, bad = [word for word in re.findall(r"\w+", meaning) if word in CHOICES[option]], ["", "something"]
+            assert set(good) == set(CHOICES[option]), f"{option} is of no known kind, or its help leaves a word out"
+        for value in good:
+            assert str(resolve_options(method, "medium", {option: value})[option]).lower() == str(value).lower()
+        for value in bad:
+            with pytest.raises(UsageError, match=option):
+                resolve_options(method, "medium", {option: value})
 
 
 def test_scenes_lists_every_built_in_scene_with_its_licence(capsys: pytest.CaptureFixture[str]) -> None:
