@@ -9,12 +9,13 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from glcaustics.caustics.method import IRRADIANCE, QUALITIES, CausticsMethod
+from glcaustics.caustics.method import IRRADIANCE, CausticsMethod
 from glcaustics.caustics.registry import METHODS
 from glcaustics.errors import UsageError
 from glcaustics.graph import FrameGraph, PassDecl
 from glcaustics.passes.context import PassContext
 from glcaustics.passes.frame import FrameSetup
+from glcaustics.quality import QUALITIES
 
 NAME = "given irradiance"
 

@@ -150,11 +150,7 @@ def _landings(renderer: Renderer) -> list[FloatArray]:
     """(H, W, 4) of each kind of path: pixel, inverse area, status of every photon of the frame before."""
     runner = renderer._runner
     assert runner is not None
-    found = []
-    for name in sorted(slot for slot in runner.plan.slots if "landing_px" in slot):
-        texture = runner.texture(name)
-        found.append(np.frombuffer(texture.read(), np.float32).reshape(texture.height, texture.width, 4).astype(float))
-    return found
+    return [runner.read(name).astype(float) for name in sorted(runner.plan.slots) if "landing_px" in name]
 
 
 def same_hits(ours: Sequence[FloatArray], exact: Sequence[FloatArray]) -> dict[str, float]:

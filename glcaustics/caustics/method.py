@@ -13,8 +13,6 @@ from glcaustics.passes.geometry import SPECULAR_KINDS
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.scene.model import OpticalKind, Scene
 
-QUALITIES = ("draft", "low", "medium", "high", "reference")
-
 IRRADIANCE = "caustics.irradiance"  # what every method writes: E_c at the camera's opaque pixels, W/m^2 or lux
 NOISY_IRRADIANCE = "caustics.irradiance_noisy"  # what a noisy method writes instead when it is denoised
 

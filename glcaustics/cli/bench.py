@@ -82,8 +82,8 @@ def _measure(args: argparse.Namespace) -> dict[str, Any]:
 def _plan(args: argparse.Namespace) -> Plan:
     from glcaustics.bench.plan import FULL, PARTS, QUICK
     from glcaustics.bench.targets import TARGETS
-    from glcaustics.caustics.method import QUALITIES
     from glcaustics.caustics.registry import METHODS
+    from glcaustics.quality import QUALITIES
 
     plan = QUICK if args.quick else FULL
     known: dict[str, tuple[list[str] | None, Iterable[str], str]] = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from glcaustics.cli.choices import check_aovs, check_method, check_settings
+from glcaustics.quality import DEFAULT_QUALITY
 
 
 def plan_command(args: argparse.Namespace) -> int:
@@ -14,7 +15,7 @@ def plan_command(args: argparse.Namespace) -> int:
 
     method, aovs = check_method(args.method), check_aovs(args.aov, AOVS)
     scene = load_scene(args.scene)
-    quality, options = args.quality or scene.quality or "medium", check_settings(args.settings)
+    quality, options = args.quality or scene.quality or DEFAULT_QUALITY, check_settings(args.settings)
     plan = plan_frame(scene, args.size, method, quality, aovs, options=options)
     print(plan.to_dot() if args.dot else plan.explain())
     return 0

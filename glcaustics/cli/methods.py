@@ -7,14 +7,13 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from glcaustics.cli.choices import check_name
-from glcaustics.cli.parser import QUALITIES
+from glcaustics.quality import DEFAULT_QUALITY, QUALITIES
 
 if TYPE_CHECKING:
     from glcaustics.caustics.method import CausticsMethod
 
 AUTO_WORDS = "the method that the scene names, else {best}"
 NONE_WORDS = "no caustics: direct light alone"
-DEFAULT_QUALITY = "medium"
 
 
 def methods_command(args: argparse.Namespace) -> int:

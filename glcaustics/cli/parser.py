@@ -9,9 +9,9 @@ from typing import Any, NoReturn
 
 import glcaustics
 from glcaustics.errors import UsageError
+from glcaustics.quality import DEFAULT_QUALITY, QUALITIES
 
 BACKENDS = ("auto", "egl", "osmesa", "glfw")
-QUALITIES = ("draft", "low", "medium", "high", "reference")
 MAX_SIDE_PX = 32768  # beyond any driver's limit; the driver's own is checked by the renderer
 
 
@@ -71,7 +71,7 @@ def _add_scene(command: argparse.ArgumentParser, **more: Any) -> None:
 def _add_frame_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("--size", type=size, default=(1280, 720), metavar="WxH", help="pixels (default: 1280x720)")
     command.add_argument("--method", default="auto", metavar="NAME", help="caustics method, 'auto' or 'none'")
-    command.add_argument("--quality", choices=QUALITIES, help="default: the scene's own, else medium")
+    command.add_argument("--quality", choices=QUALITIES, help=f"default: the scene's own, else {DEFAULT_QUALITY}")
     command.add_argument(
         "--aov",
         nargs="+",

@@ -16,6 +16,7 @@ import glcaustics
 from glcaustics import output
 from glcaustics.cli.choices import check_aovs, check_method, check_settings
 from glcaustics.errors import UsageError
+from glcaustics.quality import DEFAULT_QUALITY
 
 if TYPE_CHECKING:
     from glcaustics.renderer import Frame, Renderer
@@ -57,7 +58,7 @@ def render_command(args: argparse.Namespace) -> int:
         scene,
         size=args.size,
         method=args.method,
-        quality=args.quality or scene.quality or "medium",
+        quality=args.quality or scene.quality or DEFAULT_QUALITY,
         backend=args.backend,
         aovs=tuple(name for name in job.aovs if name != "image"),
         specular_view=args.specular_view,

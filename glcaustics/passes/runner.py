@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import moderngl
+import numpy as np
 
 from glcaustics.gpu import Device
 from glcaustics.graph import Plan, TextureDesc
@@ -77,6 +78,10 @@ class PlanRunner:
     def texture(self, resource: str) -> moderngl.Texture:
         """An output of the plan."""
         return self._textures[resource]
+
+    def read(self, resource: str) -> np.ndarray:
+        """An output of the plan, (H, W) or (H, W, C), row 0 lowest; 16-bit floats as float32."""
+        return self.device.read(self._textures[resource])
 
     def step_bytes(self) -> dict[str, int]:
         """Bytes of the attachments that each step writes."""

@@ -97,7 +97,7 @@ class AovReader:
         raise UsageError(f"AOV '{name}' is unknown", where="--aov", remedy=f"there are: {', '.join(AOVS)}")
 
     def _floats(self, resource: str, components: int) -> Float32Array:
-        return read_floats(self._runner.texture(resource), components)
+        return read_floats(self._runner, resource, components)
 
     def _if_there(self, resource: str, components: int) -> Float32Array:
         """Zeros where nothing in the scene is specular, or no method brings caustics."""

@@ -12,6 +12,7 @@ from glcaustics.denoise import svgf
 from glcaustics.graph import FrameGraph, Plan
 from glcaustics.passes import depth_chain, gbuffer, lighting, refraction, rsm, shadow_map, taa, tonemap
 from glcaustics.passes.frame import FrameSetup
+from glcaustics.quality import DEFAULT_QUALITY
 from glcaustics.renderer.aov import aov_resources
 from glcaustics.renderer.options import resolve_options
 from glcaustics.scene.model import OpticalKind, Scene
@@ -125,7 +126,7 @@ def plan_frame(
     scene: Scene,
     size: tuple[int, int] = (1280, 720),
     method: str = AUTO,
-    quality: str = "medium",
+    quality: str = DEFAULT_QUALITY,
     aovs: tuple[str, ...] = (),
     *,
     specular_view: bool = True,

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from glcaustics.caustics.method import QUALITIES, CausticsMethod
+from glcaustics.caustics.method import CausticsMethod
 from glcaustics.denoise import svgf
 from glcaustics.errors import UsageError
 from glcaustics.passes import gbuffer, refraction
 from glcaustics.passes.options import OPTION_HELP, check_options
+from glcaustics.quality import QUALITIES
 
 BASE_LADDER: dict[str, dict[str, Any]] = {
     quality: {

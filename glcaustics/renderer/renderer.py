@@ -19,6 +19,7 @@ from glcaustics.graph import Plan
 from glcaustics.passes import taa
 from glcaustics.passes.frame import FrameSetup
 from glcaustics.passes.runner import PlanRunner
+from glcaustics.quality import DEFAULT_QUALITY
 from glcaustics.renderer.aov import AovReader, aov_resources
 from glcaustics.renderer.declare import DeclaredFrame, declare_frame, named_method
 from glcaustics.renderer.frame import Frame
@@ -62,7 +63,7 @@ class Renderer:
         scene: Scene,
         size: tuple[int, int] = (1280, 720),
         method: str = AUTO,
-        quality: str = "medium",
+        quality: str = DEFAULT_QUALITY,
         backend: str = "auto",
         *,
         context: moderngl.Context | None = None,
@@ -182,8 +183,8 @@ class Renderer:
         times_ms = [first.stats["frame_ms"]]
         for index in range(1, samples):
             times_ms.append(self._timed_draw(time, (taa.halton(index, 2) - 0.5, taa.halton(index, 3) - 0.5)))
-            image += read_floats(runner.texture(declared.radiance), 3)
-            ldr += read_rgb8(runner.texture(PICTURE))
+            image += read_floats(runner, declared.radiance, 3)
+            ldr += read_rgb8(runner, PICTURE)
         first.stats |= {"frame_ms": float(np.median(times_ms)), "samples": samples}
         rounded = np.rint(ldr / samples).astype(np.uint8)
         return Frame((image / samples).astype(np.float32), rounded, first.aov, first.stats)
@@ -192,8 +193,8 @@ class Renderer:
         runner, declared = self._prepared(time)
         self.device.ctx.finish()
         frame_ms = self._timed_draw(time)
-        image = read_floats(runner.texture(declared.radiance), 3)
-        ldr = read_rgb8(runner.texture(PICTURE))
+        image = read_floats(runner, declared.radiance, 3)
+        ldr = read_rgb8(runner, PICTURE)
         assert self._sequence.drawn is not None
         aovs = AovReader(runner, self._sequence.drawn, image, specular=declared.specular)
         aov = {name: aovs.read(name) for name in self.aovs}

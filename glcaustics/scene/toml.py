@@ -17,6 +17,7 @@ import numpy as np
 from PIL import Image as PillowImage
 
 from glcaustics.errors import SceneError
+from glcaustics.quality import QUALITIES
 from glcaustics.scene.camera_path import CameraKey, camera_path
 from glcaustics.scene.defaults import complete
 from glcaustics.scene.gltf import GltfContents, read_gltf
@@ -36,8 +37,6 @@ from glcaustics.scene.strict_table import StrictTable
 from glcaustics.scene.toml_objects import existing_file, read_object
 from glcaustics.scene.toml_water import read_water
 from glcaustics.scene.validate import validate_scene
-
-QUALITIES = ("draft", "low", "medium", "high", "reference")
 
 
 def load_toml(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scene:

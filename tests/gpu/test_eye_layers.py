@@ -54,12 +54,7 @@ def layers(device: Device, scene: Scene, size: tuple[int, int], *resources: str)
     gpu.update(scene.instances_at(0.0))
     camera = CameraState.make(scene.camera, size, setup.scene_bounds_ws, boxes_ws=boxes_of(scene.instances))
     runner.run(FrameState(0.0, camera, camera, gpu, 1.0))
-    found = []
-    for resource in resources:
-        texture = runner.texture(resource)
-        kind = {"f4": np.float32, "f2": np.float16}[texture.dtype]
-        data = np.frombuffer(texture.read(), kind).reshape(texture.height, texture.width, -1)
-        found.append(data[::-1].astype(np.float64))
+    found = [np.atleast_3d(runner.read(resource))[::-1].astype(np.float64) for resource in resources]
     runner.release()
     gpu.release()
     return found

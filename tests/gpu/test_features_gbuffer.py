@@ -124,12 +124,8 @@ def motion_of(
         gpu.update(scene.instances_at(0.0))
         states = [CameraState.make(c, size, setup.scene_bounds_ws) for c in (scene.camera, before)]
         runner.run(FrameState(0.0, states[0], states[1], gpu, 1.0, transforms))
-        motion, depth = runner.texture("gbuffer.motion"), runner.texture("gbuffer.depth_m")
-        kind = {"f4": np.float32, "f2": np.float16}[motion.dtype]
-        return (
-            np.frombuffer(motion.read(), kind).reshape(size[1], size[0], 2)[::-1].astype(np.float64),
-            np.frombuffer(depth.read(), np.float32).reshape(size[1], size[0])[::-1].astype(np.float64),
-        )
+        motion, depth = runner.read("gbuffer.motion"), runner.read("gbuffer.depth_m")
+        return motion[::-1].astype(np.float64), depth[::-1].astype(np.float64)
     finally:
         runner.release()
         gpu.release()
@@ -194,11 +190,8 @@ def test_motion_of_water_that_rises(device: Device) -> None:
             else:
                 gpu.update(scene.instances_at(time_s))
             runner.run(FrameState(time_s, camera, camera, gpu, 1.0))
-            shape = (SIZE[1], SIZE[0], -1)
-            raw = np.frombuffer(runner.texture("specular.motion").read(), np.float16)
-            motion = raw.reshape(shape)[::-1].astype(np.float64)
-            depth = np.frombuffer(runner.texture("specular.depth_m").read(), np.float32).reshape(shape)[::-1, :, 0]
-            found.append((motion, depth.astype(np.float64)))
+            motion, depth = runner.read("specular.motion"), runner.read("specular.depth_m")
+            found.append((motion[::-1].astype(np.float64), depth[::-1].astype(np.float64)))
     finally:
         runner.release()
         gpu.release()

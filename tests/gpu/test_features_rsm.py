@@ -41,13 +41,7 @@ def rsm_of(device: Device, scene: Scene, *, with_specular: bool) -> Iterator[dic
         gpu.update(scene.instances_at(0.0))
         camera = CameraState.make(scene.camera, (32, 32), setup.scene_bounds_ws)
         runner.run(FrameState(0.0, camera, camera, gpu, 1.0))
-        found = {}
-        for n, resource in names.items():
-            texture = runner.texture(resource)
-            kind = {"f4": np.float32, "f2": np.float16}[texture.dtype]
-            data = np.frombuffer(texture.read(), kind)
-            found[n] = data.reshape(texture.height, texture.width, -1).astype(np.float64)
-        yield found
+        yield {n: np.atleast_3d(runner.read(resource)).astype(np.float64) for n, resource in names.items()}
     finally:
         runner.release()
         gpu.release()

@@ -12,12 +12,12 @@ import pytest
 from glcaustics import cli
 from glcaustics.caustics import photon_options
 from glcaustics.caustics.light_solve import ESTIMATES
-from glcaustics.caustics.method import QUALITIES
 from glcaustics.caustics.registry import AUTO, METHODS, NONE, pick
 from glcaustics.cli import doctor
 from glcaustics.denoise import svgf
 from glcaustics.errors import UsageError
 from glcaustics.passes.refraction import SOLVERS
+from glcaustics.quality import QUALITIES
 from glcaustics.renderer.options import default_options, option_help, resolve_options
 from glcaustics.scene.load import builtin_scenes
 

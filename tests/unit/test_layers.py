@@ -13,13 +13,14 @@ import glcaustics
 
 PACKAGE = Path(glcaustics.__file__).resolve().parent
 GLSL = PACKAGE.parent / "glsl"
-BASE = {"errors"}
+BASE = {"errors", "quality"}
 DATA = {"graph", "gpu", "scene"}
 TECHNIQUES = {"passes", "caustics", "denoise"}
 
 # part of the package -> the other parts that it may import
 MAY_IMPORT = {
     "errors": set[str](),
+    "quality": set[str](),
     "graph": BASE,
     "gpu": BASE,
     "scene": BASE,
