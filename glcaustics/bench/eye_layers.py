@@ -8,23 +8,19 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from glcaustics.bench.convergence import seeded_cameras
-from glcaustics.bench.eye_truth import has_open_surface
-from glcaustics.bench.scene_export import beam_mesh
-from glcaustics.bench.solver_variants import Buffers, scene_buffers
+from glcaustics.bench.eye_truth import cast_rays, has_open_surface
+from glcaustics.bench.scene_export import opaque_caster
+from glcaustics.bench.solver_variants import scene_buffers
 from glcaustics.errors import UsageError
 from glcaustics.gpu import create_device
-from glcaustics.optics.beam_scene import BeamScene
-from glcaustics.optics.raycast import RayCaster
-from glcaustics.passes.raster import raster_from_world
 from glcaustics.renderer import Renderer
 from glcaustics.scene.load import load_scene
-from glcaustics.scene.model import Camera, OpticalKind, Scene
+from glcaustics.scene.model import Camera, Scene
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -49,20 +45,6 @@ class LayerShares:
     cost: float
 
 
-def true_pixels(caster: RayCaster, buffers: Buffers) -> tuple[FloatArray, BoolArray]:
-    """Where the picture holds each ray's first hit, (H, W, 2) pixels, and the mask of rays with one; row 0 lowest."""
-    tried = buffers.ray[..., 3] > 0.0
-    direction = np.asarray(buffers.ray[tried][:, :3], np.float64)
-    hits = caster.first_hits(np.asarray(buffers.origin_ws[tried], np.float64), direction)
-    points = np.where((hits.object_id >= 0)[:, None], hits.point_ws, 0.0)
-    q = np.concatenate([points, np.ones((len(points), 1))], axis=1) @ raster_from_world(buffers.camera, buffers.size).T
-    px = q[:, :2] / np.where(q[:, 3:] > 0.0, q[:, 3:], 1.0)
-    inside = (hits.object_id >= 0) & (q[:, 3] > 0.0) & np.all((px >= 0.0) & (px < np.asarray(buffers.size)), axis=1)
-    at, found = np.zeros((*tried.shape, 2)), np.zeros(tried.shape, bool)
-    at[tried], found[tried] = px, inside
-    return at, found
-
-
 def eye_layers(
     scene: Scene,
     camera: Camera,
@@ -78,13 +60,13 @@ def eye_layers(
     """
     if not has_open_surface(scene):
         raise UsageError(f"scene '{scene.name}' has no open surface", where="eye_layers", remedy="take one with water")
-    meshes = tuple(beam_mesh(i) for i in scene.instances_at(0.0) if i.optical_kind is OpticalKind.DIFFUSE)
     with create_device(backend) as device:
-        truth, found = true_pixels(RayCaster(BeamScene(meshes, ())), scene_buffers(device, scene, camera, size))
+        ends = cast_rays(opaque_caster(scene.instances_at(0.0)), scene_buffers(device, scene, camera, size))
+    truth, found = ends.picture(ends.px), ends.picture(ends.inside)
     still = replace(scene, camera=camera, camera_at=None)
     shares: dict[int, LayerShares] = {}
     with ExitStack() as stack:
-        made: dict[int, Any] = {
+        made = {
             layers: stack.enter_context(
                 Renderer(
                     still,
@@ -121,7 +103,7 @@ def eye_layers(
     return shares
 
 
-def _costs(made: dict[int, Any], rounds: int) -> dict[int, float]:
+def _costs(made: dict[int, Renderer], rounds: int) -> dict[int, float]:
     """Median processor seconds of a frame, the renderers in turns."""
     times: dict[int, list[float]] = {layers: [] for layers in made}
     for _ in range(rounds):

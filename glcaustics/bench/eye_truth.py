@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from glcaustics.bench.convergence import ITERATIONS
-from glcaustics.bench.scene_export import beam_mesh, beam_scene
+from glcaustics.bench.scene_export import beam_scene, opaque_caster
 from glcaustics.bench.solver_variants import Buffers, VariantBench, ray_from_px, scene_buffers
 from glcaustics.gpu import Device, create_device
 from glcaustics.optics.beam_paths import PathTracer
-from glcaustics.optics.beam_scene import BeamScene
-from glcaustics.optics.raycast import RayCaster
+from glcaustics.optics.raycast import Hits, RayCaster
+from glcaustics.passes.camera import CameraState
 from glcaustics.scene.model import Camera, OpticalKind, Scene
 
 FloatArray = npt.NDArray[np.float64]
@@ -44,6 +43,39 @@ class EyeTruth:
         return self.pixels * self.resolvable
 
 
+@dataclass(frozen=True, eq=False)
+class RayEnds:
+    """Where the n eye rays of a picture end on opaque surfaces, by float64 ray casting.
+
+    `tried`: (H, W), pixels with a ray, row 0 lowest; the others by ray, in the picture's order: `direction_ws` (n, 3),
+    `hits`, and of these `px` (n, 2) pixel coordinates, `depth_m` (n,) along the view axis, `inside` (n,) the picture.
+    """
+
+    tried: BoolArray
+    direction_ws: FloatArray
+    hits: Hits
+    px: FloatArray
+    depth_m: FloatArray
+    inside: BoolArray
+
+    def picture(self, values: np.ndarray) -> np.ndarray:
+        """Values by ray (n, ...) as (H, W, ...), 0 where there is no ray."""
+        made = np.zeros((*self.tried.shape, *values.shape[1:]), values.dtype)
+        made[self.tried] = values
+        return made
+
+
+def cast_rays(caster: RayCaster, buffers: Buffers) -> RayEnds:
+    """Follow every eye ray of a picture to what it hits first."""
+    tried = buffers.ray[..., 3] > 0.0
+    direction = np.asarray(buffers.ray[tried][:, :3], np.float64)
+    hits = caster.first_hits(np.asarray(buffers.origin_ws[tried], np.float64), direction)
+    there = hits.object_id >= 0
+    px, depth = _project(buffers, np.where(there[:, None], hits.point_ws, 0.0))
+    inside = there & (depth > 0.0) & np.all((px >= 0.0) & (px < np.asarray(buffers.size)), axis=1)
+    return RayEnds(tried, direction, hits, px, depth, inside)
+
+
 def has_open_surface(scene: Scene) -> bool:
     """Whether there is a surface of one interface, such as water."""
     return any(i.optical_kind is OpticalKind.INTERFACE for i in scene.instances_at(0.0))
@@ -61,8 +93,7 @@ def eye_truth(
     Raises:
         UsageError: embreex is not installed.
     """
-    meshes = tuple(beam_mesh(i) for i in scene.instances_at(0.0) if i.optical_kind is OpticalKind.DIFFUSE)
-    caster = RayCaster(BeamScene(meshes, ()))
+    caster = opaque_caster(scene.instances_at(0.0))
     found = []
     with create_device(backend) as device:
         for camera in cameras:
@@ -71,16 +102,19 @@ def eye_truth(
             if not resolvable.any():
                 continue
             bench = VariantBench(device, buffers)
-
-            def near(variant: str, count: int, bench: Any = bench, at: Any = resolvable, exact: Any = exact) -> float:
-                off = np.abs(bench.solve(variant, count)[at][:, :2] - exact[at]).max(axis=-1)
-                return float((off <= 1.0).mean())
-
+            newton, dda = (
+                tuple(_near(bench.solve(variant, count), exact, resolvable) for count in counts)
+                for variant, counts in (("planes", iterations), ("dda", (MANY,)))
+            )
             rays = int((buffers.ray[..., 3] > 0.0).sum())
-            shares = tuple(near("planes", count) for count in iterations)
-            found.append(EyeTruth(rays, float(resolvable.sum()) / rays, tuple(iterations), shares, near("dda", MANY)))
+            found.append(EyeTruth(rays, float(resolvable.sum()) / rays, tuple(iterations), newton, dda[0]))
             bench.release()
     return found
+
+
+def _near(solved: FloatArray, exact: FloatArray, where: BoolArray) -> float:
+    """Share of the pixels of a mask solved within one pixel (max norm) of the exact place."""
+    return float((np.abs(solved[where][:, :2] - exact[where]).max(axis=-1) <= 1.0).mean())
 
 
 def solid_truth(
@@ -110,24 +144,16 @@ def solid_truth(
 
 def ray_truth(caster: RayCaster, buffers: Buffers) -> tuple[FloatArray, BoolArray]:
     """Pixel coordinates (H, W, 2) of what each ray hits first, and the mask (H, W) where the camera sees that."""
-    tried = buffers.ray[..., 3] > 0.0
-    direction = np.asarray(buffers.ray[tried][:, :3], np.float64)
-    hits = caster.first_hits(np.asarray(buffers.origin_ws[tried], np.float64), direction)
-    camera, size = buffers.camera, buffers.size
-    px, depth = _project(buffers, hits.point_ws)
-    inside = (hits.object_id >= 0) & (depth > 0.0) & np.all((px >= 0.0) & (px < np.asarray(size)), axis=1)
-    eye_ray = np.concatenate([px, np.ones_like(px[:, :1])], axis=1) @ ray_from_px(camera, size).T
+    ends, camera = cast_rays(caster, buffers), buffers.camera
+    hits, px = ends.hits, ends.px
+    eye_ray = np.concatenate([px, np.ones_like(px[:, :1])], axis=1) @ ray_from_px(camera, buffers.size).T
     sees = np.einsum("ij,ij->i", hits.geometric_ws, eye_ray if not camera.orthographic else -_back(camera, px))
-    meets = np.einsum("ij,ij->i", hits.geometric_ws, direction)
-    seen = inside & (sees * meets > 0.0) & _stored(buffers, hits.point_ws, hits.geometric_ws, px, depth)
-    exact = np.zeros((*tried.shape, 2))
-    exact[tried] = px
-    resolvable = np.zeros(tried.shape, bool)
-    resolvable[tried] = seen
-    return exact, resolvable
+    meets = np.einsum("ij,ij->i", hits.geometric_ws, ends.direction_ws)
+    seen = ends.inside & (sees * meets > 0.0) & _stored(buffers, hits.point_ws, hits.geometric_ws, px, ends.depth_m)
+    return ends.picture(px), ends.picture(seen)
 
 
-def _back(camera: Any, like: FloatArray) -> FloatArray:
+def _back(camera: CameraState, like: FloatArray) -> FloatArray:
     """The view's backward axis, once a row of `like`."""
     return np.broadcast_to(camera.world_from_camera[:3, 2], (len(like), 3))
 

@@ -15,12 +15,10 @@ import numpy.typing as npt
 
 from glcaustics.bench.convergence import ITERATIONS, SCENES, pooled
 from glcaustics.bench.light_solver import LightSolver
-from glcaustics.bench.scene_export import beam_mesh
+from glcaustics.bench.scene_export import opaque_caster
 from glcaustics.caustics.branches import SOLID, Branch
 from glcaustics.errors import UsageError
 from glcaustics.gpu import create_device
-from glcaustics.optics.beam_scene import BeamScene
-from glcaustics.optics.raycast import RayCaster
 from glcaustics.optics.refract import refract
 from glcaustics.passes.light_views import LightView
 from glcaustics.scene.load import load_scene
@@ -136,8 +134,7 @@ def _truth(solver: LightSolver, branch: Branch) -> tuple[str, int, BoolArray, Fl
         resolvable = status > 0
         return "dense march", int((status != 0).sum()), resolvable, landed[resolvable]
     origin, direction, refracts = _refracted(solver)
-    meshes = tuple(beam_mesh(i) for i in solver.instances if i.optical_kind is OpticalKind.DIFFUSE)
-    hits = RayCaster(BeamScene(meshes, ())).first_hits(origin[refracts], direction[refracts])
+    hits = opaque_caster(solver.instances).first_hits(origin[refracts], direction[refracts])
     found = hits.object_id >= 0
     view, stored = solver.view(branch), solver.texture(f"receiver.{branch.view}.position_ws")
     seen = _visible(view, stored, hits.point_ws[found], hits.geometric_ws[found], direction[refracts][found])

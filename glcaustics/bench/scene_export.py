@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import numpy.typing as npt
 
@@ -9,6 +11,7 @@ from glcaustics.errors import SceneError, UsageError
 from glcaustics.optics.beam_scene import BeamLight, BeamMesh, BeamScene, BeamWater, SurfaceKind, SurfaceOptics
 from glcaustics.optics.beam_spread import RoughOptics, SizedBeamLight
 from glcaustics.optics.beams import HeightField
+from glcaustics.optics.raycast import RayCaster
 from glcaustics.optics.receivers import PlaneGrid
 from glcaustics.scene.model import Camera, Instance, Light, LightKind, Material, OpticalKind, Scene, WaterBody
 from glcaustics.scene.water import WaveSurface, surface_of
@@ -189,3 +192,12 @@ def camera_rays(camera: Camera, size: tuple[int, int], samples: int = 1) -> tupl
     local = np.stack([x * tangent, y * tangent, -np.ones_like(x)], axis=-1)
     local /= np.linalg.norm(local, axis=-1, keepdims=True)
     return np.broadcast_to(eye, local.shape).copy(), np.asarray(local @ rotation.T)
+
+
+def opaque_caster(instances: Iterable[Instance]) -> RayCaster:
+    """Casts rays at the opaque ones.
+
+    Raises:
+        UsageError: embreex is not installed.
+    """
+    return RayCaster(BeamScene(tuple(beam_mesh(i) for i in instances if i.optical_kind is OpticalKind.DIFFUSE), ()))
