@@ -14,7 +14,7 @@ from glcaustics.renderer import Renderer
 from glcaustics.scene.model import Camera, Scene
 
 _PARTS = ("depth_chain.4", "depth_chain.levels", "refraction")
-_STAGES = ("opaque", "first", "mask", "marching", "reflection")
+_STAGES = ("opaque", "first", "mask", "finish")
 
 
 def eye_cost(

@@ -104,37 +104,28 @@ def _execute(ctx: PassContext) -> None:
         program = _program(ctx, outputs, **stage, SOUSA=int(solver == "sousa"), FINAL=int(solver != "cascade"))
         device.draw_fullscreen(program.set(u_mask_depth=1.0), target, depth_func=">")
     if solver == "cascade":
-        _finish(ctx, outputs)
+        _finish(ctx)
 
 
-def _finish(ctx: PassContext, outputs: dict[str, int]) -> None:
-    """What Newton left to do. A depth mask skips the other pixels before any shader runs: 1 all, 0.5 the reflection."""
-    device = ctx.device
+def _finish(ctx: PassContext) -> None:
+    """Marches what Newton left to do and reflections that count. A depth mask skips the other pixels before any shader
+    runs. All is added: the first stage has left black what is missing.
+    """
+    device, seeds = ctx.device, _seeds(ctx.setup)
     with device.timer("refraction/mask"):
         program = device.program("passes/refraction/todo").set(t_todo=ctx.texture("view.todo"))
         device.draw_fullscreen(program, ctx.target(depth=TODO_DEPTH), depth_func="1", depth_write=True)
-    with device.timer("refraction/marching"):
-        program = _program(ctx, outputs, NEWTON=0, MARCH=_MARCH["cascade"], SOUSA=0, FINAL=1, RETRY=1)
-        target = ctx.target(*OUTPUTS.values(), depth=TODO_DEPTH)
-        device.draw_fullscreen(program.set(u_mask_depth=0.75), target, depth_func="<=")
-    with device.timer("refraction/reflection"):
-        _reflect(ctx)
-
-
-def _reflect(ctx: PassContext) -> None:
-    """Reflections that count, added to the picture; with `reflection_history` from the last frame's ends on."""
-    seeds = _seeds(ctx.setup)
-    written = {"RADIANCE": "view.radiance", **({"REFLECTION_M": REFLECTION_M} if seeds else {})}
-    outputs = {f"HAS_{name}": 0 for name in OUTPUTS} | ctx.locations(**written)
-    stage = {"NEWTON": 0, "MARCH": _MARCH["cascade"], "SOUSA": 0, "FINAL": 1, "REFLECTION": 1, "SEEDED": int(seeds)}
-    program = _program(ctx, outputs, **stage)
-    if seeds:
-        ctx.target(REFLECTION_M).clear()  # added to, as the radiance is
-        before = ctx.frame.history_camera or ctx.frame.camera
-        program.set(t_last_reflection_m=ctx.history(REFLECTION_M))
-        program.set(u_last_raster_from_world=raster_from_world(before, ctx.setup.size))
-    target = ctx.target(*written.values(), depth=TODO_DEPTH)
-    ctx.device.draw_fullscreen(program.set(u_mask_depth=0.25), target, depth_func="<=", blend="add")
+    with device.timer("refraction/finish"):
+        written = {k: v for k, v in OUTPUTS.items() if k != "TODO"} | ({"REFLECTION_M": REFLECTION_M} if seeds else {})
+        stage = {"NEWTON": 0, "MARCH": _MARCH["cascade"], "SOUSA": 0, "FINAL": 1, "FINISH": 1, "SEEDED": int(seeds)}
+        program = _program(ctx, ctx.locations(**written), **stage).set(t_todo=ctx.texture("view.todo"))
+        if seeds:
+            ctx.target(REFLECTION_M).clear()
+            before = ctx.frame.history_camera or ctx.frame.camera
+            program.set(t_last_reflection_m=ctx.history(REFLECTION_M))
+            program.set(u_last_raster_from_world=raster_from_world(before, ctx.setup.size))
+        target = ctx.target(*written.values(), depth=TODO_DEPTH)
+        device.draw_fullscreen(program.set(u_mask_depth=0.5 / 255.0), target, depth_func="<=", blend="add")
 
 
 def _seeds(setup: FrameSetup) -> bool:
@@ -152,8 +143,7 @@ def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
         **_eye_defines(ctx),
         "FINAL": stage["FINAL"],
         "HAS_SECOND": int(stage["FINAL"] and ctx.has("shade2.radiance")),
-        "RETRY": stage.get("RETRY", 0),
-        "REFLECTION": stage.get("REFLECTION", 0),
+        "FINISH": stage.get("FINISH", 0),
         "SEEDED": stage.get("SEEDED", 0),
         "USE_NEWTON": stage["NEWTON"],
         # The cascade marches instead; and with few look-ups there is no time for it.

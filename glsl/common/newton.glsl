@@ -27,7 +27,8 @@ struct GlcSolve {
 const float GLC_SOLVE_TOLERANCE_PX = 1.0;
 
 // t_plane: rgba32f planes. facing: 1 for surfaces that the ray enters from the eye's side, -1 for those it leaves towards it.
-// The loop holds one break and no other branch: what failed is told apart after it.
+// The loop holds one break, at its end, and no other branch: what failed is told apart after it. (A software renderer leaves a loop
+// where its end is reached with no pixel left: a condition at its head costs one more turn, in which nothing happens.)
 // u: where to look first. restarts: where the bracket closes without a surface, or the ray is behind one that it does not meet, the
 // search goes on beyond that, where the last surface before it led to; pays from some six look-ups on, among thin things. Constants,
 // facing and restarts cost nothing where they are not used.
@@ -37,14 +38,15 @@ GlcSolve glc_newton_from(sampler2D t_plane, GlcRasterRay ray, float facing, floa
     float front = 0.0, behind = 1.0, ahead = 0.0;
     float extent = max(abs(ray.step.x), abs(ray.step.y)), pixel = 1.0 / max(extent, 1e-6);
     bool hit = false;
-    for (int i = 0; i < max_iterations; ++i) {
+    float first = u;
+    for (;;) {
         vec2 texel = clamp(floor(ray.start.xy + u * ray.step.xy), vec2(0.0), last);
         vec2 f = facing * glc_raster_plane(ray, texelFetch(t_plane, ivec2(texel), 0));
         float met = f.y < 0.0 ? f.x / f.y : -1.0;
         vec2 off = abs(ray.start.xy + met * ray.step.xy - texel - 0.5);
         // A ray that does not meet the plane has no distance there.
         solve.error_px = met >= 0.0 && met <= 1.0 ? max(off.x, off.y) : 1e6;
-        solve.iterations = i + 1;
+        solve.iterations += 1;
         solve.texel = texel;
         hit = solve.error_px <= GLC_SOLVE_TOLERANCE_PX;
         bool before = u * f.y >= f.x;
@@ -63,12 +65,13 @@ GlcSolve glc_newton_from(sampler2D t_plane, GlcRasterRay ray, float facing, floa
             }
         }
         u = hit ? u : min(u, ray.u_screen);
-        if (hit) break;
+        if (hit || solve.iterations >= max_iterations) break;
     }
     solve.u = u;
     if (hit) solve.status = GLC_SOLVE_HIT;
     else if (u >= ray.u_screen && ray.u_screen < 1.0) solve.status = GLC_SOLVE_OFFSCREEN;
     else if ((behind - front) * extent < 1.0) solve.status = GLC_SOLVE_DISCONTINUITY;
+    if (max_iterations < 1) solve = GlcSolve(first, 0.0, vec2(0.0), 1e6, GLC_SOLVE_DIVERGED, 0);   // the start alone
     return solve;
 }
 

@@ -26,5 +26,5 @@ void main() {
 #if HAS_CAUSTICS_VIEW
     seen.caustics = texelFetch(t_caustics, ivec2(gl_FragCoord.xy), 0).rgb;
 #endif
-    write_view(seen, GLC_TODO_NOTHING);
+    write_view(seen, GLC_TODO_NOTHING, 1.0, 0.0);
 }

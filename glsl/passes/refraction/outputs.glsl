@@ -18,10 +18,10 @@ layout(location = LOCATION_REFLECTION_M) out float o_reflection_m;   // metres t
 layout(location = LOCATION_SOLVE) out vec4 o_solve;              // uv of the hit, error in pixels, texel look-ups
 #endif
 
-// What later stages must finish: also the mask's depth (todo.frag).
+// What the cascade's last stage must finish, also the mask's depth (todo.frag): 0 nothing, 1/255 the reflection, k/255 from 2 on all, the
+// march beginning k - 2 steps of the way behind the refracted ray's start, so far the way is clear.
 #define GLC_TODO_NOTHING 0.0
-#define GLC_TODO_REFLECTION 0.5
-#define GLC_TODO_ALL 1.0
+#define GLC_TODO_REFLECTION (1.0 / 255.0)
 
 // The way each pixel went; renderer.AOVS documents the same numbers.
 #define GLC_VIEW_OPAQUE 0.0
@@ -34,6 +34,7 @@ layout(location = LOCATION_SOLVE) out vec4 o_solve;              // uv of the hi
 #define GLC_VIEW_HIDDEN 7.0
 #define GLC_VIEW_SECOND 8.0
 
+// What is seen somewhere. distance_m: of the way there, behind the interface.
 struct Seen {
     vec3 radiance;
     vec3 caustics;
@@ -44,15 +45,15 @@ struct Seen {
     float status;
 };
 
-void write_view(Seen seen, float todo) {
+void write_view(Seen seen, float todo, float alpha, float reflection_m) {
 #if HAS_RADIANCE
-    o_radiance = vec4(seen.radiance, 1.0);
+    o_radiance = vec4(seen.radiance, alpha);
 #endif
 #if HAS_TODO
     o_todo = todo;
 #endif
 #if HAS_REFLECTION_M
-    o_reflection_m = seen.status == GLC_VIEW_MARCHED || seen.status == GLC_VIEW_NEWTON ? seen.distance_m : 0.0;
+    o_reflection_m = reflection_m;
 #endif
 #if HAS_CAUSTICS_VIEW
     o_caustics = vec4(seen.caustics, 1.0);
