@@ -182,6 +182,16 @@ def tuft(seed, count, radius, lengths, widths, bend, rows, root=-0.14):
     return joined(blades)
 
 
+def on_ground(names, spots, height, random, sizes):
+    """Nodes of the named parts in turn at (x, z) spots of a ground y = height(x, z), turned and, in (low, high), sized
+    at random.
+    """
+    return [
+        (names[n % len(names)], matrix(x, height(x, z), z, random.uniform(0, 360), random.uniform(*sizes)))
+        for n, (x, z) in enumerate(spots)
+    ]
+
+
 def matrix(x, y, z, turn=0.0, scale=1.0, tilt=0.0):
     """World from object, 4x4: scaled, tilted about x, turned about y (degrees), shifted."""
     out = np.eye(4)

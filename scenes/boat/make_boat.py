@@ -91,19 +91,11 @@ def make_plants():
     reeds = {f"reed{n}": geo.tuft(50 + n, 26, 0.26, (1.1, 1.9), (0.012, 0.022), (0.05, 0.35), 9) for n in range(2)}
     line = scatter(11, 15, ((-5.6, 4.6), (-3.6, -2.6)), 0.42, lambda x, z: -0.45 < bed_height(x, z) < 0.05)
     line += [(1.95, -1.75), (2.3, -1.35), (-2.55, -1.75)]
-    nodes = [
-        (f"reed{n % 2}", geo.matrix(x, bed_height(x, z), z, random.uniform(0, 360), random.uniform(0.8, 1.05)))
-        for n, (x, z) in enumerate(line)
-    ]
-    write_glb(HERE / "reeds.glb", reeds, nodes)
+    write_glb(HERE / "reeds.glb", reeds, geo.on_ground(list(reeds), line, bed_height, random, (0.8, 1.05)))
 
     grass = {"grass0": geo.tuft(70, 90, 0.55, (0.12, 0.42), (0.008, 0.016), (0.2, 0.9), 5, root=-0.10)}
     spots = scatter(13, 34, ((-6.0, 5.2), (-5.4, -2.9)), 0.50, lambda x, z: bed_height(x, z) > 0.10)
-    nodes = [
-        ("grass0", geo.matrix(x, bed_height(x, z), z, random.uniform(0, 360), random.uniform(0.8, 1.3)))
-        for x, z in spots
-    ]
-    write_glb(HERE / "grass.glb", grass, nodes)
+    write_glb(HERE / "grass.glb", grass, geo.on_ground(list(grass), spots, bed_height, random, (0.8, 1.3)))
 
     near = scatter(17, 15, ((1.35, 3.3), (-1.6, 0.9)), 0.30, lambda x, z: not in_boat(x, z, 0.3))
     far = scatter(19, 9, ((-3.6, -1.6), (-2.5, -1.3)), 0.30, lambda x, z: not in_boat(x, z, 0.3))

@@ -163,11 +163,7 @@ def make_reef():
 
     grass = {"grass": geo.tuft(71, 80, 0.45, (0.15, 0.5), (0.007, 0.013), (0.3, 1.0), 5, root=-0.10)}
     spots = scatter(14, 26, ((-5.5, 6.0), (-6.0, -2.5)), 0.55, lambda x, z: shore(x, z) > 1.55)
-    nodes = [
-        ("grass", geo.matrix(x, bed_height(x, z), z, random.uniform(0, 360), random.uniform(0.8, 1.3)))
-        for x, z in spots
-    ]
-    write_glb(HERE / "grass.glb", grass, nodes)
+    write_glb(HERE / "grass.glb", grass, geo.on_ground(list(grass), spots, bed_height, random, (0.8, 1.3)))
 
 
 def make_bed(width=2048):
