@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pytest
 
@@ -22,10 +20,9 @@ from glcaustics.bench.photons import (
 from glcaustics.caustics.registry import METHODS
 from glcaustics.errors import UsageError
 from glcaustics.scene.model import Camera, Scene
-from tests.gpu.feature_scenes import box, plane, scene_of, sheet, sun
+from tests.gpu.feature_scenes import BACKEND, box, plane, scene_of, sheet, sun
 
 pytestmark = pytest.mark.gpu
-BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
 SIZE = (48, 48)
 
 

@@ -15,7 +15,6 @@ A method is left out of a case only where it declares by `why_not` that such a s
 from __future__ import annotations
 
 import json
-import os
 from functools import cache
 
 import numpy as np
@@ -28,13 +27,13 @@ from glcaustics.optics.pixels import box_filter
 from glcaustics.renderer import Frame
 from glcaustics.scene.model import Scene
 from glcaustics.scene.transform import scaled
+from tests.gpu.feature_scenes import BACKEND
 from tests.gpu.physics_scenes import BINS, CASES, PhysicsCase, bin_centres
 
 pytestmark = pytest.mark.gpu
 
 FloatArray = npt.NDArray[np.float64]
 SIZE = (512, 512)
-BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
 NAMES = sorted(name for name in METHODS if name != "none")
 ENERGY_TOLERANCE = 0.005
 ROUNDING_SHARE = 0.025  # of independent photons' noise in a pixel that rounding may make, by moving some over borders

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -12,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytestmark = [pytest.mark.gpu, pytest.mark.smoke]
+from tests.gpu.feature_scenes import BACKEND
 
-BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
+pytestmark = [pytest.mark.gpu, pytest.mark.smoke]
 
 
 def glcaustics(*argv: str, cwd: Path) -> subprocess.CompletedProcess[str]:

@@ -5,15 +5,14 @@ Processor time of this process, all threads of the software renderer included: w
 
 from __future__ import annotations
 
-import os
 import statistics
 import time
 
 import pytest
 
 import glcaustics as glc
+from tests.gpu.feature_scenes import BACKEND
 
-BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
 pytestmark = pytest.mark.gpu
 
 

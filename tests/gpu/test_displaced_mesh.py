@@ -8,7 +8,6 @@ with folds, float64 beams.
 from __future__ import annotations
 
 import math
-import os
 import time
 from dataclasses import replace
 from functools import cache
@@ -23,11 +22,11 @@ from glcaustics.optics.fresnel import fresnel_dielectric
 from glcaustics.optics.pixels import box_filter
 from glcaustics.passes.context import PassContext
 from glcaustics.scene.model import Camera, Scene
+from tests.gpu.feature_scenes import BACKEND
 
 pytestmark = pytest.mark.gpu
 
 FloatArray = npt.NDArray[np.float64]
-BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
 BINS, INNER, IOR = 512, 64, 1.333
 SLANTED = (0.2, -1.0, 0.1)
 METHOD = "displaced_mesh"

@@ -5,7 +5,6 @@ float64 sampling and reference beams. Errors are held against the noise of as ma
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-import glcaustics as glc
 from glcaustics.bench.scene_export import beam_scene
 from glcaustics.optics.fresnel import fresnel_dielectric
 from glcaustics.optics.microfacet import ggx_visible_share, rough_reflection, visible_normals
@@ -21,36 +19,24 @@ from glcaustics.optics.pixels import bin_points, pixel_edges
 from glcaustics.optics.receivers import PlaneGrid
 from glcaustics.optics.reference import BeamSettings, reference_map
 from glcaustics.optics.refract import refract
+from glcaustics.renderer import Frame
 from glcaustics.scene.model import Instance, Light, LightKind, Scene
 from glcaustics.scene.transform import scaled
 from tests.gpu.feature_scenes import GLASS, MIRROR, WATER, box, from_above, plane, scene_of, sheet, sun
+from tests.gpu.photon_frames import photon_frames
 from tests.gpu.physics_meshes import grid_triangles, make_mesh
 from tests.unit.test_optics_spread import disc_through_flat_water, lobe_on_the_floor
 
 pytestmark = pytest.mark.gpu
-BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
 FloatArray = npt.NDArray[np.float64]
 
 
-def photons(scene: Scene, bins: int, frames: int = 4, **options: Any) -> tuple[FloatArray, glc.renderer.Frame]:
-    """Mean irradiance (bins, bins) of the green channel over frames of 2 bins^2 pixels, and the last frame."""
-    options = {"photons": 250_000, "denoise": False, "reflect": False, **options}
-    with glc.Renderer(
-        scene,
-        size=(2 * bins, 2 * bins),
-        method="photon_trace",
-        quality="low",
-        backend=BACKEND,
-        aovs=("caustic_irradiance",),
-        specular_view=False,
-        options=options,
-    ) as renderer:
-        drawn = [renderer.render() for _ in range(frames)]
-    image = np.mean([f.aov["caustic_irradiance"][..., 1].astype(np.float64) for f in drawn], axis=0)
-    return image.reshape(bins, 2, bins, 2).mean(axis=(1, 3)), drawn[-1]
+def photons(scene: Scene, bins: int, frames: int = 4, **options: Any) -> tuple[FloatArray, Frame]:
+    """Of refracted light alone, unless the options say otherwise; see `photon_frames`."""
+    return photon_frames(scene, bins, frames, **{"reflect": False, **options})
 
 
-def check(image: FloatArray, truth: FloatArray, frame: glc.renderer.Frame, truth_paths: float = math.inf) -> None:
+def check(image: FloatArray, truth: FloatArray, frame: Frame, truth_paths: float = math.inf) -> None:
     """Energy within 0.5 %; RMSE within 1.2 times that of independent photons of the same number and flux (4 frames, a
     view of 2.4 m), and of the truth's own paths if that was drawn too.
     """

@@ -4,7 +4,6 @@ see, the mean that the filter keeps, the noise that it takes, NaN in its history
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -24,11 +23,10 @@ from glcaustics.optics.receivers import PlaneGrid
 from glcaustics.optics.reference import BeamSettings, reference_map
 from glcaustics.scene.model import Camera, Light, LightKind, Scene
 from glcaustics.scene.water import Wave, WaveSurface, make_water
-from tests.gpu.feature_scenes import WATER, box, from_above, lamp, plane, scene_of, sheet, sun
+from tests.gpu.feature_scenes import BACKEND, WATER, box, from_above, lamp, plane, scene_of, sheet, sun
 from tests.gpu.physics_scenes import CASES, PhysicsCase
 
 pytestmark = pytest.mark.gpu
-BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
 FloatArray = npt.NDArray[np.float64]
 case_of = cache(lambda name: CASES[name]())
 

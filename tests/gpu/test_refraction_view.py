@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +12,8 @@ from glcaustics.bench.eye_rays import eye_convergence, look_at, seeded_cameras
 from glcaustics.errors import UsageError
 from glcaustics.passes.refraction import SOLVERS
 from glcaustics.renderer import plan_frame
-from tests.gpu.feature_scenes import plane, scene_of, sheet, sun
+from tests.gpu.feature_scenes import BACKEND, plane, scene_of, sheet, sun
 
-BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
 SIZE = (320, 180)
 AOVS = ("solve_status", "solve_hit", "solve_iterations")
 

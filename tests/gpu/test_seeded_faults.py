@@ -6,7 +6,6 @@ tests of the healthy method set, and several times the healthy run's own value.
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -24,11 +23,11 @@ from glcaustics import metrics
 from glcaustics.gpu import Device, glsl_root
 from glcaustics.optics.fresnel import fresnel_dielectric
 from glcaustics.optics.pixels import box_filter
+from tests.gpu.feature_scenes import BACKEND
 from tests.gpu.physics_scenes import BINS, CASES, WATER_IOR, PhysicsCase
 
 pytestmark = pytest.mark.gpu
 
-BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
 SIZE = 2 * BINS
 CLEARLY = 4.0  # times the healthy run's value
 

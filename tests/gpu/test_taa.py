@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -15,10 +14,9 @@ from glcaustics.passes.taa import RADIANCE
 from glcaustics.renderer import plan_frame
 from glcaustics.scene.model import Camera, Scene
 from glcaustics.scene.water import Wave, WaveSurface, make_water
-from tests.gpu.feature_scenes import WATER, box, from_above, plane, scene_of, sun
+from tests.gpu.feature_scenes import BACKEND, WATER, box, from_above, plane, scene_of, sun
 
 pytestmark = pytest.mark.gpu
-BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
 SIZE = (96, 72)
 Image = npt.NDArray[np.float32]
 

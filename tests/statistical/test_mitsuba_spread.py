@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-import glcaustics as glc
 from glcaustics.bench.mitsuba_lights import DISC_POINTS, aimed_lights
 from glcaustics.bench.mitsuba_truth import PhotonMap
 from glcaustics.bench.mitsuba_variant import best_variant, mitsuba
@@ -21,10 +20,10 @@ from glcaustics.errors import UsageError
 from glcaustics.scene.model import Instance, Light, LightKind, Material, Scene
 from glcaustics.scene.shapes_round import icosphere
 from tests.gpu.feature_scenes import GLASS, from_above, lamp, plane, scene_of, sheet, sun
+from tests.gpu.photon_frames import photon_frames
 
 MISSING = [name for name in ("mitsuba", "embreex") if importlib.util.find_spec(name) is None]
 REQUIRED = bool(os.environ.get("GLC_REQUIRE_BENCH") or os.environ.get("CI"))
-BACKEND = os.environ.get("GLC_TEST_BACKEND", "egl")
 pytestmark = [
     pytest.mark.gpu,
     pytest.mark.skipif(bool(MISSING) and not REQUIRED, reason=f"not installed: {', '.join(MISSING)}"),
@@ -42,33 +41,12 @@ def ball(light: Light, material: Material) -> Scene:
     )
 
 
-def halves_of_photons(scene: Scene, frames: int = 4, **options: Any) -> list[FloatArray]:
-    """Two independent means over frames, (BINS, BINS)."""
-    halves = []
-    for seed in range(2):
-        with glc.Renderer(
-            scene,
-            size=(2 * BINS, 2 * BINS),
-            method="photon_trace",
-            quality="medium",
-            backend=BACKEND,
-            aovs=("caustic_irradiance",),
-            specular_view=False,
-            seed=seed,
-            options={"photons": 250_000, "denoise": False, **options},
-            stats=False,
-        ) as renderer:
-            drawn = [renderer.render().aov["caustic_irradiance"][..., 1].astype(np.float64) for _ in range(frames)]
-        halves.append(np.mean(drawn, axis=0).reshape(BINS, 2, BINS, 2).mean(axis=(1, 3)))
-    return halves
-
-
 def compare(scene: Scene, photons: int, interfaces: int, pinhole: tuple[float, float, float], **options: Any) -> None:
     """Relative RMSE within 1.2 times the noise of both, bias of the mean under 1 %."""
     target = Target(scene.name, (0.0, 0.0, 0.0), HALF, pinhole, interfaces)
     tracer = PhotonMap(scene, target, BINS, best_variant(), rough=True)
     theirs = [tracer.render(photons, seed) for seed in (1, 2)]
-    ours = halves_of_photons(scene, **options)
+    ours = [photon_frames(scene, BINS, quality="medium", seed=seed, **options)[0] for seed in range(2)]
     mean = np.mean(theirs)
     noise = math.hypot(*(float(np.sqrt((0.25 * (a - b) ** 2).mean())) for a, b in (theirs, ours)))
     error = float(np.sqrt(((np.mean(ours, axis=0) - np.mean(theirs, axis=0)) ** 2).mean()))
