@@ -17,7 +17,7 @@ from glcaustics.scene.model import FloatArray, OpticalKind
 SHADER = "passes/gbuffer/gbuffer"
 SECOND = "2"  # suffix of the second layer's passes and resources: gbuffer2, lighting2, shade2, caustics2
 LAYERS = ("", SECOND)
-NO_LAYER = {"LAYER_SPECULAR": 0, "BACK": 0, "PEEL": 0}
+NO_LAYER = {"LAYER_SPECULAR": 0, "BACK": 0, "PEEL": 0, "OTHER": 0}
 NOTHING = {**NO_LAYER, "HAS_ALBEDO": 0, "HAS_MATERIAL": 0, "HAS_EMISSIVE": 0, "HAS_MOTION": 0, "HAS_PLANE": 0}
 
 
@@ -71,7 +71,7 @@ def _draw_opaque(ctx: PassContext) -> None:
     target = ctx.target(*(f"gbuffer.{n}" for n in names), depth="gbuffer.depth")
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
     live = ctx.locations(**{n.upper(): f"gbuffer.{n}" for n in names})
-    _draw(ctx, target, ctx.frame.gpu.select(OpticalKind.DIFFUSE), {**NO_LAYER, **live}, {})
+    draw_layer(ctx, target, ctx.frame.gpu.select(OpticalKind.DIFFUSE), {**NO_LAYER, **live}, {})
 
 
 def _draw_second(ctx: PassContext) -> None:
@@ -87,8 +87,8 @@ def _draw_second(ctx: PassContext) -> None:
     eye_ws = ctx.frame.camera.world_from_camera[:3, 3]
     items = ctx.frame.gpu.select(OpticalKind.DIFFUSE)
     one_sided = [item for item in items if _shows_fronts_only(item, eye_ws)]
-    _draw(ctx, target, one_sided, defines, {"t_first_plane": first}, cull="back")
-    _draw(ctx, target, [i for i in items if i not in one_sided], defines, {"t_first_plane": first})
+    draw_layer(ctx, target, one_sided, defines, {"t_first_plane": first}, cull="back")
+    draw_layer(ctx, target, [i for i in items if i not in one_sided], defines, {"t_first_plane": first})
 
 
 def _shows_fronts_only(item: DrawItem, eye_ws: FloatArray) -> bool:
@@ -124,7 +124,7 @@ def _draw_specular(ctx: PassContext) -> None:
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
     live = ctx.locations(**{n.upper(): f"specular.{n}" for n in names})
     defines = {**NOTHING, **live, "LAYER_SPECULAR": 1}
-    _draw(
+    draw_layer(
         ctx,
         target,
         ctx.frame.gpu.select(*SPECULAR_KINDS),
@@ -158,10 +158,10 @@ def _draw_back(ctx: PassContext) -> None:
     live = ctx.locations(NORMAL_WS="specular.back_normal_ws", PLANE="specular.back_plane")
     defines = {**NOTHING, "HAS_DEPTH_M": 0, **live, "BACK": 1}
     fronts = {"t_front_depth_m": ctx.texture("specular.depth_m"), "t_front_normal": ctx.texture("specular.normal_ws")}
-    _draw(ctx, target, ctx.frame.gpu.select(OpticalKind.SOLID), defines, fronts, cull="front")
+    draw_layer(ctx, target, ctx.frame.gpu.select(OpticalKind.SOLID), defines, fronts, cull="front")
 
 
-def _draw(
+def draw_layer(
     ctx: PassContext,
     target: Any,
     items: list[DrawItem],

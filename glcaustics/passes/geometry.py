@@ -89,6 +89,23 @@ def boxes_of(instances: Iterable[Instance]) -> FloatArray:
     return np.stack(boxes) if boxes else np.zeros((0, 2, 3))
 
 
+def screen_boxes_px(boxes_ws: FloatArray, clip_from_world: FloatArray, size: tuple[int, int]) -> FloatArray:
+    """Where boxes (N, 2, 3) lie in the picture: (N, 2, 2) least and most x, y in pixels, cut at its border.
+
+    Least is not below most where a box is out of sight. One that reaches behind the eye takes the whole picture.
+    """
+    ends = np.asarray(boxes_ws, np.float64)
+    picks = np.indices((2, 2, 2)).reshape(3, 8).T
+    corners = np.stack([ends[:, picks[:, axis], axis] for axis in range(3)], axis=2)
+    clip = np.concatenate((corners, np.ones((*corners.shape[:2], 1))), axis=2) @ clip_from_world.T
+    behind = clip[..., 3] <= 0.0
+    ndc = clip[..., :2] / np.where(behind, 1.0, clip[..., 3])[..., None]
+    some, none = np.any(behind, axis=1, keepdims=True), np.all(behind, axis=1, keepdims=True)
+    low = np.where(none, 2.0, np.where(some, -1.0, ndc.min(axis=1)))
+    high = np.where(none, -2.0, np.where(some, 1.0, ndc.max(axis=1)))
+    return np.clip(0.5 + 0.5 * np.stack((low, high), axis=1), 0.0, 1.0) * np.asarray(size, np.float64)
+
+
 class GpuScene:
     """Keeps the meshes of a scene on the GPU; meshes of equal identity are uploaded once, moving ones in place.
 
@@ -105,6 +122,8 @@ class GpuScene:
         self._kept_images: list[Image] = []
         self.objects: moderngl.Texture | None = None
         self.version = 0  # counts the updates that changed something
+        self._touch_version = -1
+        self._touches: dict[tuple[OpticalKind, ...], bool] = {}
 
     def update(self, instances: tuple[Instance, ...]) -> None:
         """Upload what is new. An instance of the same name and the same vertex count reuses its buffers."""
@@ -204,6 +223,19 @@ class GpuScene:
     def select(self, *kinds: OpticalKind) -> list[DrawItem]:
         """The items of some optical kinds."""
         return [item for item in self.items if item.kind in kinds]
+
+    def touch(self, one: OpticalKind, *others: OpticalKind) -> bool:
+        """Whether the box of an item of one kind meets that of another item of some kinds. Kept while nothing moves."""
+        key = (one, *others)
+        if self._touch_version != self.version:
+            self._touch_version, self._touches = self.version, {}
+        if key not in self._touches:
+            pairs = ((a, b) for a in self.select(one) for b in self.select(*others) if a is not b)
+            self._touches[key] = any(
+                bool((a.bounds_ws[0] <= b.bounds_ws[1]).all() and (b.bounds_ws[0] <= a.bounds_ws[1]).all())
+                for a, b in pairs
+            )
+        return self._touches[key]
 
     def draw(
         self,

@@ -18,6 +18,7 @@ OPTION_HELP: dict[str, str] = {
     "reflection_steps": "most steps of the march that follows a reflected ray (1..16384)",
     "reflection_history": "reflected rays are solved from where they ended in the last frame (true, false; cascade)",
     "depth_layers": "2: eye rays that end behind something are solved in a second layer of opaque surfaces (1, 2)",
+    "specular_layers": "2: water, glass and mirrors are seen behind other water and glass, too (1, 2)",
 }
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from glcaustics.errors import UsageError
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
+from glcaustics.passes import specular_layers
 from glcaustics.passes.context import PassContext
 from glcaustics.passes.eye_medium import EyeMediumFinder
 from glcaustics.passes.frame import FrameSetup
@@ -26,6 +27,7 @@ SOLVERS: dict[str, str] = {
 SECOND_CHAIN = ("depth_chain2.bounds",)
 PLANES, CHAIN = ("gbuffer.plane",), ("depth_chain.bounds",)
 SECOND_LAYER = ("shade2.radiance", "gbuffer2.plane", "shade2.caustic_irradiance")
+SOLID_LAYERS = ("specular.plane", "specular.back_plane", "specular.back_normal_ws")
 _MARCH = {"cascade": 2, "newton": 0, "dda": 1, "hierarchical": 2, "sousa": 0}
 OUTPUTS = {
     "RADIANCE": "view.radiance",
@@ -34,6 +36,8 @@ OUTPUTS = {
     "TODO": "view.todo",
     "SOLVE": "view.solve",
 }
+FINISHED = {name: resource for name, resource in OUTPUTS.items() if name != "TODO"}
+SHADER, BEHIND = "passes/refraction/refraction", "passes/refraction/behind"
 TODO_DEPTH, REFLECTION_M = "view.todo_depth", "view.reflection_m"
 
 
@@ -56,6 +60,7 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
         SECOND_LAYER if int(setup.options.get("depth_layers", 1)) > 1 and solver != "sousa" else ()
     )
     second += SECOND_CHAIN if second and _MARCH[solver] else ()
+    layers = specular_layers.reads(setup)
     graph.add(
         PassDecl(
             "refraction",
@@ -66,16 +71,20 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
                 "view.solve": TextureDesc("rgba32f", setup.size),
                 "view.todo": TextureDesc("r8", setup.size),
                 **(stages if cascade else {}),
+                **specular_layers.states(setup),
             },
             _execute,
             reads=(
                 *("shade.radiance", "gbuffer.depth_m", "specular.depth", "specular.depth_m", "specular.normal_ws"),
-                *(PLANES if solver != "sousa" else ()),
-                *(CHAIN if _MARCH[solver] == 2 else ()),
-                *(("specular.plane", "specular.back_plane", "specular.back_normal_ws") if solids else ()),
+                *(PLANES if solver != "sousa" or layers else ()),
+                *(CHAIN if _MARCH[solver] == 2 or layers else ()),
+                *dict.fromkeys((*(SOLID_LAYERS if solids else ()), *layers)),
             ),
             optional=("caustics.irradiance", *second),
-            always_writes=("view.radiance", "view.todo", *stages) if cascade else (),
+            always_writes=(
+                *(("view.radiance", "view.todo", *stages) if cascade else ()),
+                *specular_layers.states(setup),
+            ),
             history=(REFLECTION_M,) if _seeds(setup) else (),
             note=f"what water, glass and mirrors show; eye rays: {SOLVERS[solver]}{_eye_at_start(setup)}",
         )
@@ -101,10 +110,20 @@ def _execute(ctx: PassContext) -> None:
         device.draw_fullscreen(program, target, depth_func="<=")
     with device.timer("refraction/first"):
         stage = {"NEWTON": int(solver in ("cascade", "newton")), "MARCH": 0 if solver == "cascade" else _MARCH[solver]}
-        program = _program(ctx, outputs, **stage, SOUSA=int(solver == "sousa"), FINAL=int(solver != "cascade"))
+        stage |= {"SOUSA": int(solver == "sousa"), "FINAL": int(solver != "cascade")}
+        program = _program(ctx, outputs, **stage)
         device.draw_fullscreen(program.set(u_mask_depth=1.0), target, depth_func=">")
+    layers = specular_layers.shown(ctx)
+    if layers is not None:
+        with device.timer("refraction/behind"):
+            specular_layers.look(ctx, OUTPUTS, layers, lambda written: _program(ctx, written, BEHIND, **stage))
     if solver == "cascade":
         _finish(ctx)
+    if layers is not None:
+        march = _MARCH[solver]
+        stage |= {"NEWTON": int(solver == "newton"), "MARCH": march, "FINAL": 1, "CONTINUED": 1}
+        with device.timer("refraction/continued"):
+            specular_layers.go_on(ctx, FINISHED, lambda written: _program(ctx, written, **stage))
 
 
 def _finish(ctx: PassContext) -> None:
@@ -116,7 +135,7 @@ def _finish(ctx: PassContext) -> None:
         program = device.program("passes/refraction/todo").set(t_todo=ctx.texture("view.todo"))
         device.draw_fullscreen(program, ctx.target(depth=TODO_DEPTH), depth_func="1", depth_write=True)
     with device.timer("refraction/finish"):
-        written = {k: v for k, v in OUTPUTS.items() if k != "TODO"} | ({"REFLECTION_M": REFLECTION_M} if seeds else {})
+        written = FINISHED | ({"REFLECTION_M": REFLECTION_M} if seeds else {})
         stage = {"NEWTON": 0, "MARCH": _MARCH["cascade"], "SOUSA": 0, "FINAL": 1, "FINISH": 1, "SEEDED": int(seeds)}
         program = _program(ctx, ctx.locations(**written), **stage).set(t_todo=ctx.texture("view.todo"))
         if seeds:
@@ -133,7 +152,7 @@ def _seeds(setup: FrameSetup) -> bool:
     return setup.options["refraction"] == "cascade" and bool(setup.options.get("reflection_history", False))
 
 
-def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
+def _program(ctx: PassContext, outputs: dict[str, int], shader: str = SHADER, /, **stage: int) -> Any:
     """The shader's permutation for one stage, its uniforms set."""
     kinds = ctx.setup.kinds()
     defines = {
@@ -145,6 +164,8 @@ def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
         "HAS_SECOND": int(stage["FINAL"] and ctx.has("shade2.radiance")),
         "FINISH": stage.get("FINISH", 0),
         "SEEDED": stage.get("SEEDED", 0),
+        "CONTINUED": stage.get("CONTINUED", 0),
+        **specular_layers.defines(ctx, continued="CONTINUED" in stage),
         "USE_NEWTON": stage["NEWTON"],
         # The cascade marches instead; and with few look-ups there is no time for it.
         "RESTARTS": int(ctx.setup.options["refraction"] == "newton" and ctx.setup.options["refraction_iterations"] > 4),
@@ -157,7 +178,9 @@ def _program(ctx: PassContext, outputs: dict[str, int], **stage: int) -> Any:
     specular = [item for item in ctx.frame.gpu.items if item.kind in SPECULAR_KINDS]
     one = specular[0].instance.material if len(specular) == 1 and specular[0].kind is not OpticalKind.MIRROR else None
     defines["ONE_OBJECT"] = KIND_INDEX[specular[0].kind] if one is not None else 0
-    program = ctx.device.program("passes/refraction/refraction", defines)
+    if shader == BEHIND:
+        defines["NESTED"] = specular_layers.nested(ctx)
+    program = ctx.device.program(shader, defines, vertex=f"{SHADER}.vert")
     if one is not None:
         program.set(u_one_ior=one.ior_rgb(), u_one_sigma_a=one.sigma_a, u_one_transmission=one.transmission)
     options = ctx.setup.options
@@ -211,6 +234,8 @@ def _textures(ctx: PassContext) -> dict[str, Any]:
         "t_plane2": "gbuffer2.plane",
         "t_bounds2": "depth_chain2.bounds",
         "t_caustics2": "shade2.caustic_irradiance",
+        "t_behind_plane": "specular2.plane",
+        "t_behind_normal": "specular2.normal_ws",
     }
     found = {name: ctx.texture(resource) for name, resource in samplers.items() if ctx.has(resource)}
     return {**found, "t_objects": ctx.frame.gpu.objects}

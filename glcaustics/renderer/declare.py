@@ -10,7 +10,7 @@ from glcaustics.caustics.method import IRRADIANCE, NOISY_IRRADIANCE, CausticsMet
 from glcaustics.caustics.registry import AUTO, pick
 from glcaustics.denoise import svgf
 from glcaustics.graph import FrameGraph, Plan
-from glcaustics.passes import depth_chain, gbuffer, lighting, refraction, rsm, shadow_map, taa, tonemap
+from glcaustics.passes import depth_chain, gbuffer, lighting, refraction, rsm, shadow_map, specular_layers, taa, tonemap
 from glcaustics.passes.frame import FrameSetup
 from glcaustics.quality import DEFAULT_QUALITY
 from glcaustics.renderer.aov import aov_resources
@@ -96,7 +96,7 @@ def _declare_view(graph: FrameGraph, setup: FrameSetup, method: CausticsMethod |
     """What the eye sees in and through specular surfaces; whether it sees any."""
     if not (setup.has_specular and specular_view):
         why = "nothing in the scene is specular" if specular_view else "the eye is asked to look past specular surfaces"
-        for name in ("gbuffer2", "gbuffer.specular", "gbuffer.specular_back", "refraction"):
+        for name in ("gbuffer2", "gbuffer.specular", "gbuffer.specular_back", "gbuffer.specular2", "refraction"):
             graph.leave_out(name, why)
         return False
     gbuffer.declare_specular(graph, setup)
@@ -104,6 +104,7 @@ def _declare_view(graph: FrameGraph, setup: FrameSetup, method: CausticsMethod |
         gbuffer.declare_back(graph, setup)
     else:
         graph.leave_out("gbuffer.specular_back", "nothing in the scene is a solid with two interfaces")
+    specular_layers.declare(graph, setup)
     _declare_second_layer(graph, setup, method)
     refraction.declare(graph, setup)
     return True

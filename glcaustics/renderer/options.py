@@ -8,7 +8,7 @@ from typing import Any
 from glcaustics.caustics.method import CausticsMethod
 from glcaustics.denoise import svgf
 from glcaustics.errors import UsageError
-from glcaustics.passes import gbuffer, refraction
+from glcaustics.passes import gbuffer, refraction, specular_layers
 from glcaustics.passes.options import OPTION_HELP, check_options
 from glcaustics.quality import QUALITIES
 
@@ -22,6 +22,7 @@ BASE_LADDER: dict[str, dict[str, Any]] = {
         "reflection_steps": reflection,
         "reflection_history": False,
         "depth_layers": 1,
+        "specular_layers": specular_layers.MAX_LAYERS,
     }
     for quality, shadow, rsm_size, solver, iterations, steps, reflection in (
         ("draft", 512, 256, "newton", 3, 256, 24),
@@ -74,7 +75,8 @@ def resolve_options(method: type[CausticsMethod] | None, quality: str, options: 
             )
         resolved[name] = {"true": True, "false": False}.get(value, value) if isinstance(value, str) else value
     refraction.check_solver(resolved["refraction"])
-    whole = {**dict.fromkeys(_COUNTS, (1, 16384)), "depth_layers": (1, len(gbuffer.LAYERS))}
+    layers = {"depth_layers": (1, len(gbuffer.LAYERS)), "specular_layers": (1, specular_layers.MAX_LAYERS)}
+    whole = {**dict.fromkeys(_COUNTS, (1, 16384)), **layers}
     check_options(resolved, "--set", whole=whole, flags=("reflection_history",))
     if method is not None:
         method.validate(resolved)

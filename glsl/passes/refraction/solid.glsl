@@ -3,6 +3,10 @@
 uniform sampler2D t_front_plane;
 uniform sampler2D t_back_plane;
 uniform sampler2D t_back_normal;
+#if EXITS_UNDER
+uniform sampler2D t_behind_plane;
+uniform sampler2D t_behind_normal;
+#endif
 
 const int SOLID_ITERATIONS = 5;
 // How far off its own surface a reflected ray starts, of the way to there: rounding must not put it behind.
@@ -59,21 +63,39 @@ bool solid_exit(vec3 p, vec3 d, float leg_m, out vec3 exit_ws, out vec3 n, out f
     return solve.status == GLC_SOLVE_HIT;
 }
 
+#if EXITS_UNDER
+// A solid that floats: the interface behind the solid's front (behind.glsl) that a point lies below; 0 for none.
+float interface_over(vec3 p) {
+    vec4 q = u_raster_from_world * vec4(p, 1.0);
+    vec2 px = clamp(q.xy / q.w, vec2(0.0), u_raster_size - 0.001);
+    vec4 plane = texelFetch(t_behind_plane, ivec2(px), 0);
+    float met = texelFetch(t_behind_normal, ivec2(px), 0).w;
+    if (met <= 0.0 || q.z / q.w >= plane.z + dot(plane.xy, px)) return 0.0;
+    return glc_object(int(met + 0.5) - 1).kind == GLC_INTERFACE ? met : 0.0;
+}
+#endif
+
 // On entry d is the direction inside. tint takes Fresnel and absorption. Returns false where the light is still held inside after
-// one total internal reflection; d is then the direction that it would go on in.
-bool solid_through(inout vec3 p, inout vec3 d, float ior, vec3 sigma_a, inout vec3 tint) {
+// one total internal reflection; d is then the direction that it would go on in. ior: solid_ior relative to what the ray came from; so
+// is outside, of what the solid stands in; under: object index + 1 of the interface that the exit lies below, 0 for none.
+bool solid_through(inout vec3 p, inout vec3 d, float solid_ior, float ior, vec3 sigma_a, inout vec3 tint, inout float outside, out float under) {
+    under = 0.0;
     float leg_m = 0.0;
     for (int bounce = 0; bounce < 2; ++bounce) {
-        vec3 exit_ws, n, outside;
+        vec3 exit_ws, n, bent;
         float t;
         // The other side of the solid is often hidden after a reflection inside: then the mirrored direction alone goes on.
         if (!solid_exit(p, d, leg_m, exit_ws, n, t) && bounce > 0) return false;
         tint *= glc_transmittance(sigma_a, t);
-        bool leaves = glc_refract(d, n, 1.0 / ior, outside);
-        if (leaves) tint *= 1.0 - glc_fresnel_dielectric(-dot(n, d), 1.0 / ior);
-        p = leaves ? exit_ws : exit_ws + REFLECTED_START * t * outside;
+#if EXITS_UNDER
+        under = interface_over(exit_ws);
+        if (under > 0.0) outside = ior * glc_object(int(under + 0.5) - 1).ior.g / solid_ior;
+#endif
+        bool leaves = glc_refract(d, n, outside / ior, bent);
+        if (leaves) tint *= 1.0 - glc_fresnel_dielectric(-dot(n, d), outside / ior);
+        p = leaves ? exit_ws : exit_ws + REFLECTED_START * t * bent;
         leg_m = t;
-        d = outside;
+        d = bent;
         if (leaves) return true;
     }
     return false;

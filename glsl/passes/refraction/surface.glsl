@@ -18,6 +18,14 @@ uniform float u_one_transmission;
 in vec2 v_uv;
 in vec3 v_ray_ws;
 
+// The ray to the surface runs in something else than air. solid: object index + 1 of the closed solid that this is the inside of, or 0.
+#define HAS_MEDIA (HAS_EYE_MEDIUM || CONTINUED)
+struct Medium {
+    vec3 sigma_a;
+    float ior;
+    float solid;
+};
+
 struct Surface {
     vec3 p;              // metres
     float depth_m;
@@ -28,23 +36,19 @@ struct Surface {
     bool mirror;
     bool from_dense;     // seen from inside the object's medium
     float eta;           // n_behind / n_before
+#if HAS_MEDIA
+    Medium before;       // what the ray to the surface runs in
+    Medium around;       // what the rays behind a solid run in
+    vec3 carries;        // of what leaves the surface, to the eye
+#endif
 };
 
-Surface surface_at(ivec2 pixel) {
-    Surface at;
-    at.depth_m = texelFetch(t_specular_depth_m, pixel, 0).r;
-    vec4 stored = texelFetch(t_specular_normal, pixel, 0);
+// What the surface is, from p, v and what the ray to it runs in. stored: as in the layer's normals.
+void set_surface(inout Surface at, vec4 stored) {
 #if ONE_OBJECT
     at.object = GlcObject(vec3(1.0), ONE_OBJECT, u_one_ior, 0.0, u_one_sigma_a, u_one_transmission);
 #else
     at.object = glc_object(int(abs(stored.w) + 0.5) - 1);
-#endif
-#if ORTHOGRAPHIC
-    at.p = glc_camera_position_ws(v_uv, at.depth_m);
-    at.v = glc_camera_ray_ws(v_uv);
-#else
-    at.p = u_world_from_camera[3].xyz + at.depth_m * v_ray_ws;
-    at.v = normalize(v_ray_ws);
 #endif
     // A shading normal that leans away from the eye would reflect into the surface: bring it back to grazing.
     at.n = stored.xyz;
@@ -54,12 +58,30 @@ Surface surface_at(ivec2 pixel) {
         at.cos_i = max(-dot(at.n, at.v), 0.02);
     }
     at.mirror = HAS_MIRROR == 1 && at.object.kind == GLC_MIRROR;
-#if HAS_EYE_MEDIUM
-    at.from_dense = stored.w < 0.0 && (at.object.kind == GLC_INTERFACE || -stored.w == u_eye_solid);
-    at.eta = at.from_dense ? 1.0 / at.object.ior.g : at.object.ior.g / u_eye_ior;
+#if HAS_MEDIA
+    at.from_dense = stored.w < 0.0 && (at.object.kind == GLC_INTERFACE || -stored.w == at.before.solid);
+    at.eta = at.from_dense ? 1.0 / at.object.ior.g : at.object.ior.g / at.before.ior;
 #else
     at.from_dense = at.object.kind == GLC_INTERFACE && stored.w < 0.0;
     at.eta = at.from_dense ? 1.0 / at.object.ior.g : at.object.ior.g;
 #endif
+}
+
+Surface surface_at(ivec2 pixel) {
+    Surface at;
+    at.depth_m = texelFetch(t_specular_depth_m, pixel, 0).r;
+#if ORTHOGRAPHIC
+    at.p = glc_camera_position_ws(v_uv, at.depth_m);
+    at.v = glc_camera_ray_ws(v_uv);
+#else
+    at.p = u_world_from_camera[3].xyz + at.depth_m * v_ray_ws;
+    at.v = normalize(v_ray_ws);
+#endif
+#if HAS_EYE_MEDIUM
+    at.before = Medium(u_eye_sigma_a, u_eye_ior, u_eye_solid);
+    at.around = at.before;
+    at.carries = glc_eye_transmittance(v_uv, at.depth_m, u_bounds_min_ws, u_bounds_max_ws);
+#endif
+    set_surface(at, texelFetch(t_specular_normal, pixel, 0));
     return at;
 }
