@@ -4,7 +4,7 @@ and 2).
 
 from __future__ import annotations
 
-from typing import Any
+import moderngl
 
 from glcaustics.gpu import Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
@@ -140,7 +140,7 @@ def _draw_kind(
     ctx: PassContext,
     view: LightView,
     program: Program,
-    target: Any,
+    target: moderngl.Framebuffer,
     items: list[DrawItem],
     *,
     cull: str | None = None,

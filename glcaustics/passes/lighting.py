@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import moderngl
+
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes.context import PassContext
 from glcaustics.passes.frame import FrameSetup, LightSetup
@@ -58,7 +60,13 @@ def _execute_lighting(ctx: PassContext, layer: str) -> None:
 
 
 def _draw_light(
-    ctx: PassContext, light: LightSetup, target: Any, textures: dict[str, Any], highlight: bool, *, masked: bool
+    ctx: PassContext,
+    light: LightSetup,
+    target: moderngl.Framebuffer,
+    textures: dict[str, Any],
+    highlight: bool,
+    *,
+    masked: bool,
 ) -> None:
     defines = {"HAS_HIGHLIGHT": int(highlight), "HAS_SHADOW": int(light.shadow is not None)}
     values = {**ctx.frame.uniforms(), **light_uniforms(light.light), **textures}

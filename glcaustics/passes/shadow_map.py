@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
+from glcaustics.gpu import Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes.context import PassContext
 from glcaustics.passes.frame import FrameSetup, LightSetup
+from glcaustics.passes.geometry import DrawItem
+from glcaustics.scene.model import FloatArray
 
 SHADER = "passes/shadow_map/shadow_map"
 
@@ -31,5 +36,9 @@ def _execute(ctx: PassContext, light: LightSetup, resource: str) -> None:
             target,
             items,
             viewport=viewport,
-            per_item=lambda p, item, m=matrix: p.set(u_clip_from_object=m @ item.world_from_object),  # type: ignore[misc]
+            per_item=partial(_place, matrix),
         )
+
+
+def _place(clip_from_world: FloatArray, program: Program, item: DrawItem) -> None:
+    program.set(u_clip_from_object=clip_from_world @ item.world_from_object)
