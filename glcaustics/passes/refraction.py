@@ -37,6 +37,7 @@ OUTPUTS = {
     "SOLVE": "view.solve",
 }
 FINISHED = {name: resource for name, resource in OUTPUTS.items() if name != "TODO"}
+NOT_WRITTEN = {"HAS_TODO": 0, "HAS_REFLECTION_M": 0, "HAS_BEHIND": 0}  # unless a stage does
 SHADER, BEHIND = "passes/refraction/refraction", "passes/refraction/behind"
 TODO_DEPTH, REFLECTION_M = "view.todo_depth", "view.reflection_m"
 
@@ -102,21 +103,24 @@ def _eye_at_start(setup: FrameSetup) -> str:
 def _execute(ctx: PassContext) -> None:
     solver = str(ctx.setup.options["refraction"])
     device = ctx.device
+    layers = specular_layers.shown(ctx)
     outputs = ctx.locations(**OUTPUTS)
     target = ctx.target(*OUTPUTS.values(), depth="specular.depth")
     with device.timer("refraction/opaque"):
-        program = device.program("passes/refraction/opaque", {"HAS_REFLECTION_M": 0, **outputs, **_eye_defines(ctx)})
+        program = device.program("passes/refraction/opaque", {**NOT_WRITTEN, **outputs, **_eye_defines(ctx)})
         program.set_all({**_textures(ctx), **_eye_uniforms(ctx)})
         device.draw_fullscreen(program, target, depth_func="<=")
     with device.timer("refraction/first"):
         stage = {"NEWTON": int(solver in ("cascade", "newton")), "MARCH": 0 if solver == "cascade" else _MARCH[solver]}
         stage |= {"SOUSA": int(solver == "sousa"), "FINAL": int(solver != "cascade")}
-        program = _program(ctx, outputs, **stage)
-        device.draw_fullscreen(program.set(u_mask_depth=1.0), target, depth_func=">")
-    layers = specular_layers.shown(ctx)
+        written = OUTPUTS | (specular_layers.clear_candidates(ctx) if layers else {})
+        program = _program(ctx, ctx.locations(**written), **stage).set(u_mask_depth=1.0)
+        if layers is not None:
+            program.set(**layers.uniforms())
+        device.draw_fullscreen(program, ctx.target(*written.values(), depth="specular.depth"), depth_func=">")
     if layers is not None:
         with device.timer("refraction/behind"):
-            specular_layers.look(ctx, OUTPUTS, layers, lambda written: _program(ctx, written, BEHIND, **stage))
+            specular_layers.look(ctx, OUTPUTS, lambda written: _program(ctx, written, BEHIND, **stage))
     if solver == "cascade":
         _finish(ctx)
     if layers is not None:
@@ -156,8 +160,7 @@ def _program(ctx: PassContext, outputs: dict[str, int], shader: str = SHADER, /,
     """The shader's permutation for one stage, its uniforms set."""
     kinds = ctx.setup.kinds()
     defines = {
-        "HAS_TODO": 0,
-        "HAS_REFLECTION_M": 0,
+        **NOT_WRITTEN,
         **outputs,
         **_eye_defines(ctx),
         "FINAL": stage["FINAL"],

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,7 @@ CHAIN = "specular2.chain.bounds"
 READS = ("specular.plane", "specular2.plane", "specular2.normal_ws", CHAIN)
 BACK_READS = ("specular2.back_plane", "specular2.back_normal_ws")
 MASK = "view.second_depth"
+CANDIDATES = {"BEHIND": "view.behind"}
 STATE = {"POINT": "view.second_point", "WAY": "view.second_way", "SHARE": "view.second_share"}
 
 
@@ -99,6 +101,7 @@ def states(setup: FrameSetup) -> dict[str, TextureDesc]:
         STATE["POINT"]: wide,
         STATE["WAY"]: wide,
         STATE["SHARE"]: TextureDesc("rgba16f", setup.size),
+        CANDIDATES["BEHIND"]: TextureDesc("r8", setup.size),
         MASK: TextureDesc("depth24", setup.size),
     }
 
@@ -106,33 +109,46 @@ def states(setup: FrameSetup) -> dict[str, TextureDesc]:
 def _draw_second(ctx: PassContext) -> None:
     names = {"DEPTH_M": "specular2.depth_m", "NORMAL_WS": "specular2.normal_ws", "PLANE": "specular2.plane"}
     target = ctx.target(*names.values(), depth="specular2.depth")
-    target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-    if not in_view(ctx.frame, ctx.setup.size):
+    view = in_view(ctx.frame, ctx.setup.size)
+    if view is None:
         return
     live = ctx.locations(**names)
     first = {"t_normal": "specular.normal_ws", "t_depth_m": "specular.depth_m", "t_plane": "specular.plane"}
     copy = ctx.device.program("passes/gbuffer/copy_specular", live)
-    copy.set_all({name: ctx.texture(resource) for name, resource in first.items()})
-    ctx.device.draw_fullscreen(copy, ctx.target(*names.values()))
+    copy.set_all(
+        {name: ctx.texture(resource) for name, resource in first.items()} | {"t_objects": ctx.frame.gpu.objects}
+    )
+    ctx.device.draw_fullscreen(copy, target, depth_func="1", depth_write=True)
+    items = ctx.frame.gpu.select(*SPECULAR_KINDS)
+    _peel(ctx, target, live, [item for item in items if item.index != view.widest])
+    # The widest object covers most of what it is in front of itself: there early depth testing spares its shading.
+    cover = ctx.device.program("passes/gbuffer/cover").set(t_normal=ctx.texture("specular.normal_ws"))
+    cover.set(u_widest=float(view.widest + 1))
+    ctx.device.draw_fullscreen(cover, ctx.target(depth="specular2.depth"), depth_func="1", depth_write=True)
+    _peel(ctx, target, live, [item for item in items if item.index == view.widest])
+
+
+def _peel(ctx: PassContext, target: Any, live: dict[str, int], items: list[DrawItem]) -> None:
     textures = {"t_opaque_depth_m": ctx.texture("gbuffer.depth_m"), "t_front_normal": ctx.texture("specular.normal_ws")}
     defines = {**NOTHING, **live, "LAYER_SPECULAR": 1, "OTHER": 1}
-    closed = [item for item in ctx.frame.gpu.select(OpticalKind.SOLID) if _shows_fronts_only(item, ctx.frame)]
-    both_sides = [item for item in ctx.frame.gpu.select(*SPECULAR_KINDS) if item not in closed]
+    closed = [item for item in items if _shows_fronts_only(item, ctx.frame)]
     draw_layer(ctx, target, closed, defines, textures, cull="back")
-    draw_layer(ctx, target, both_sides, defines, textures)
+    draw_layer(ctx, target, [item for item in items if item not in closed], defines, textures)
 
 
 def _shows_fronts_only(item: DrawItem, frame: FrameState) -> bool:
     """A solid's far side, unless the eye is inside. Not where mirroring swaps front and back."""
+    if item.kind is not OpticalKind.SOLID:
+        return False
     inside = frame.eye_medium is not None and frame.eye_medium.solid == item.index
     return not inside and float(np.linalg.det(item.world_from_object[:3, :3])) > 0.0
 
 
 def _draw_back(ctx: PassContext) -> None:
     target = ctx.target("specular2.back_normal_ws", "specular2.back_plane", depth="specular2.back_depth")
-    target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
     if not in_view(ctx.frame, ctx.setup.size):
         return
+    target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
     live = ctx.locations(NORMAL_WS="specular2.back_normal_ws", PLANE="specular2.back_plane")
     defines = {**NOTHING, "HAS_DEPTH_M": 0, **live, "BACK": 1}
     fronts = {"t_front_depth_m": ctx.texture("specular2.depth_m"), "t_front_normal": ctx.texture("specular2.normal_ws")}
@@ -148,6 +164,10 @@ class InView:
 
     widest: int
     others_px: FloatArray
+
+    def uniforms(self) -> dict[str, Any]:
+        """For the first stage of `refraction.frag`, which tells the pixels whose rays may meet another object."""
+        return {"u_widest": float(self.widest + 1), "u_others_px": tuple(self.others_px)}
 
 
 def in_view(frame: FrameState, size: tuple[int, int]) -> InView | None:
@@ -179,7 +199,13 @@ def nested(ctx: PassContext) -> int:
     return int(ctx.frame.gpu.touch(OpticalKind.SOLID, OpticalKind.SOLID, OpticalKind.MIRROR))
 
 
-def look(ctx: PassContext, outputs: dict[str, str], view: InView, program: Callable[..., Program]) -> None:
+def clear_candidates(ctx: PassContext) -> dict[str, str]:
+    """What the first stage writes besides the view: the pixels to look at."""
+    ctx.target(CANDIDATES["BEHIND"]).clear(0.0, 0.0, 0.0, 0.0)
+    return CANDIDATES
+
+
+def look(ctx: PassContext, outputs: dict[str, str], program: Callable[..., Program]) -> None:
     """Where the first layer's rays meet this one; of the first surface, its reflection alone is left in the view.
 
     Args:
@@ -191,9 +217,10 @@ def look(ctx: PassContext, outputs: dict[str, str], view: InView, program: Calla
     written = ctx.locations(**outputs, **STATE)
     made = program({name: value for name, value in written.items() if name not in always})
     made.set_all({name: ctx.texture(resource) for name, resource in _BEHIND.items() if ctx.has(resource)})
-    made.set(u_mask_depth=1.0, u_widest=float(view.widest + 1), u_others_px=tuple(view.others_px))
-    target = ctx.target(*outputs.values(), *STATE.values(), depth="specular.depth")
-    ctx.device.draw_fullscreen(made, target, depth_func=">")
+    mask = ctx.device.program("passes/refraction/todo").set(t_todo=ctx.texture(CANDIDATES["BEHIND"]))
+    ctx.device.draw_fullscreen(mask, ctx.target(depth=MASK), depth_func="1", depth_write=True)
+    target = ctx.target(*outputs.values(), *STATE.values(), depth=MASK)
+    ctx.device.draw_fullscreen(made.set(u_mask_depth=0.75), target, depth_func="<=")
 
 
 def go_on(ctx: PassContext, outputs: dict[str, str], program: Callable[..., Program]) -> None:

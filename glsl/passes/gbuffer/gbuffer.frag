@@ -1,9 +1,9 @@
 // The camera's G-buffer: opaque layer, (PEEL) the opaque layer behind it, specular layer or (BACK) the specular layer's back
 // faces. Only attachments that some pass reads exist (HAS_...). LAYER_SPECULAR keeps what lies in front of the opaque layer.
 // Source of peeling: Everitt 2001; here with a tolerance that follows the first surface's slope. OTHER peels specular layers by object:
-// of the other objects, what is nearest behind the first surface, unless that is a mirror.
+// of the other objects, what is nearest behind the first surface.
 #include "common/optics.glsl"
-#if HAS_ALBEDO || HAS_MATERIAL || HAS_EMISSIVE || OTHER
+#if HAS_ALBEDO || HAS_MATERIAL || HAS_EMISSIVE
 #include "interface/objects.glsl"
 #endif
 
@@ -89,9 +89,7 @@ void main() {
     if (first.w <= 0.0 || v_depth_m <= first.w * (1.0 + PEEL_RELATIVE) + PEEL_PIXELS * slope_m) discard;
 #endif
 #if OTHER
-    float first = abs(texelFetch(t_front_normal, ivec2(gl_FragCoord.xy), 0).w);
-    if (first == 0.0 || first == u_object + 1.0) discard;
-    if (int(texelFetch(t_objects, ivec2(0, int(first + 0.5) - 1), 0).w + 0.5) == GLC_MIRROR) discard;
+    if (abs(texelFetch(t_front_normal, ivec2(gl_FragCoord.xy), 0).w) == u_object + 1.0) discard;
 #endif
 #if BACK
     if (v_depth_m <= texelFetch(t_front_depth_m, ivec2(gl_FragCoord.xy), 0).r) discard;

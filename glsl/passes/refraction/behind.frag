@@ -13,8 +13,6 @@ uniform sampler2D t_behind_back;     // of its solids, the back faces' planes
 #endif
 uniform sampler2D t_opaque_plane;
 uniform sampler2D t_opaque_bounds;
-uniform float u_widest;              // object index + 1 of the widest object in the picture: the others lie within u_others_px
-uniform vec4 u_others_px;
 layout(location = LOCATION_POINT) out vec4 o_point;   // world space, metres; w: what the ray runs in there, MEDIUM_*
 layout(location = LOCATION_WAY) out vec4 o_way;       // unit direction; w: of the surface met, as in the layer's normals
 layout(location = LOCATION_SHARE) out vec4 o_share;   // of what that shows, how much the eye sees
@@ -50,12 +48,6 @@ bool goes_on_beyond(GlcRasterRay ray, float own, out vec4 met, out float u) {
 bool meets_second(GlcRasterRay ray, float own, out vec4 met, out float u) {
     met = vec4(0.0);
     u = 0.0;
-    if (own == u_widest) {
-        vec3 end = ray.start + ray.u_screen * ray.step;
-        bvec2 before = lessThan(max(ray.start.xy, end.xy), u_others_px.xy);
-        bvec2 beyond = greaterThan(min(ray.start.xy, end.xy), u_others_px.zw);
-        if (any(before) || any(beyond)) return false;
-    }
     float from = 0.0, pixel = 1.0 / max(max(abs(ray.step.x), abs(ray.step.y)), 1e-6);
     for (int i = 0; i < OWN_TRIES && from < ray.u_screen; ++i) {
         GlcRasterRay part = ray;

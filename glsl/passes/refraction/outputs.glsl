@@ -14,6 +14,9 @@ layout(location = LOCATION_TODO) out float o_todo;               // GLC_TODO_*
 #if HAS_REFLECTION_M
 layout(location = LOCATION_REFLECTION_M) out float o_reflection_m;   // metres to where the reflected ray was solved; 0: it was not
 #endif
+#if HAS_BEHIND
+layout(location = LOCATION_BEHIND) out float o_behind;           // 1: a second specular surface may be met, see behind.frag
+#endif
 #if HAS_SOLVE
 layout(location = LOCATION_SOLVE) out vec4 o_solve;              // uv of the hit, error in pixels, texel look-ups
 #endif

@@ -5,6 +5,21 @@
 // CONTINUED: the surface is the one that a ray behind the first one met (behind.frag), and what it shows is added.
 #include "passes/refraction/rays.glsl"
 
+#if HAS_BEHIND
+uniform float u_widest;              // object index + 1 of the widest specular object in the picture: the others lie within u_others_px
+uniform vec4 u_others_px;
+
+// Whether the way of the refracted ray, to where it was solved or to its end, touches the pixels of objects other than its own.
+float may_meet_others(Rays rays, Seen seen) {
+    if (!rays.refracts) return 0.0;
+    if (abs(texelFetch(t_specular_normal, ivec2(gl_FragCoord.xy), 0).w) != u_widest) return 1.0;
+    bool ends = seen.status == GLC_VIEW_NEWTON || seen.status == GLC_VIEW_MARCHED;
+    vec2 end = ends ? seen.uv * u_raster_size : (rays.ray.start + rays.ray.u_screen * rays.ray.step).xy;
+    vec2 least = min(min(gl_FragCoord.xy, rays.ray.start.xy), end) - 1.0, most = max(max(gl_FragCoord.xy, rays.ray.start.xy), end) + 1.0;
+    return all(lessThan(least, u_others_px.zw)) && all(greaterThan(most, u_others_px.xy)) ? 1.0 : 0.0;
+}
+#endif
+
 void main() {
 #if CONTINUED
     Surface at = continued_surface(ivec2(gl_FragCoord.xy));
@@ -34,6 +49,9 @@ void main() {
     if (!solved || rays.reflects) reflection = vec3(0.0);
     todo = solved ? (rays.reflects ? GLC_TODO_REFLECTION : GLC_TODO_NOTHING) : todo_from(clear_px);
 #endif
+#endif
+#if HAS_BEHIND
+    o_behind = may_meet_others(rays, seen);
 #endif
     seen.radiance = shown(at, reflection, rays.refracts ? rays.tint * seen.radiance : vec3(0.0), seen.distance_m, rays.under);
     write_view(seen, todo, FINISH + CONTINUED > 0 ? 0.0 : 1.0, reflection_m);
