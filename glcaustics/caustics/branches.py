@@ -24,7 +24,7 @@ STATUS_WORDS = {  # negative values in landing.w; see solve.frag
 }
 NO_EXIT = -4
 LEFT = -8  # out of the scene: not lost, there is nothing to land on
-CONVERGED, BRACKETED = 1, 2
+CONVERGED, BRACKETED = 1, 2  # where light lands, plus 2 x its path through solids: see `solids_entered`
 
 
 REFLECT, INTERFACE, SOLID = "reflect", "interface", "solid"
@@ -107,6 +107,11 @@ def branches_of(setup: FrameSetup, light: LightSetup, method: str) -> list[Branc
     return branches
 
 
+def solids_entered(status: np.ndarray) -> np.ndarray:
+    """How many solids light has entered after its first one, by landing.w (any shape); 0 where it does not land."""
+    return np.maximum(status.astype(int) - 1, 0) // 2 // 8
+
+
 def solve_statistics(branch: Branch, runner: PlanRunner) -> dict[str, Any]:
     """Iterations, converged and failed rays, and the flux they carry or lose, of one solve. Reads two textures back."""
     landing = read_rgba32f(runner, branch.landing)
@@ -122,8 +127,8 @@ def solve_statistics(branch: Branch, runner: PlanRunner) -> dict[str, Any]:
     return {
         "solve": branch.pass_name("solve"),
         "rays": int(tried.sum()),
-        "converged": int((status == CONVERGED).sum()),
-        "bracketed": int((status == BRACKETED).sum()),
+        "converged": int((landed & (status % 2 == CONVERGED % 2)).sum()),
+        "bracketed": int((landed & (status % 2 == BRACKETED % 2)).sum()),
         "left_the_scene": int(left.sum()),
         "failed": int((tried & ~landed & ~left).sum()),
         "lookups_mean": float(iterations.mean()) if iterations.size else 0.0,

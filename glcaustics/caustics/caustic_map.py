@@ -37,7 +37,7 @@ class CausticMap(LightMapMethod):
             "max_iterations": 6,
             "march_steps": 12,
             "gather_taps": 1,
-            "internal_bounces": 0,
+            "internal_bounces": 2,
             "max_radius": 8.0,
         },
         "low": {
@@ -46,7 +46,7 @@ class CausticMap(LightMapMethod):
             "max_iterations": 8,
             "march_steps": 16,
             "gather_taps": 1,
-            "internal_bounces": 1,
+            "internal_bounces": 4,
             "max_radius": 12.0,
         },
         "medium": {
@@ -55,7 +55,7 @@ class CausticMap(LightMapMethod):
             "max_iterations": 10,
             "march_steps": 24,
             "gather_taps": 2,
-            "internal_bounces": 2,
+            "internal_bounces": 16,
             "max_radius": 16.0,
         },
         "high": {
@@ -64,7 +64,7 @@ class CausticMap(LightMapMethod):
             "max_iterations": 12,
             "march_steps": 48,
             "gather_taps": 4,
-            "internal_bounces": 4,
+            "internal_bounces": 24,
             "max_radius": 32.0,
         },
         "reference": {
@@ -73,7 +73,7 @@ class CausticMap(LightMapMethod):
             "max_iterations": 16,
             "march_steps": 96,
             "gather_taps": 6,
-            "internal_bounces": 8,
+            "internal_bounces": 32,
             "max_radius": 48.0,
         },
     }

@@ -39,11 +39,11 @@ class DisplacedMesh(LightMapMethod):
             "gather_taps": taps, "internal_bounces": bounces, "max_radius": radius,
         }
         for quality, caster, map_size, iterations, steps, taps, bounces, radius in (
-            ("draft", 96, 256, 6, 12, 1, 0, 16.0),
-            ("low", 160, 384, 8, 16, 1, 1, 24.0),
-            ("medium", 256, 768, 10, 24, 2, 2, 32.0),
-            ("high", 512, 1024, 12, 48, 4, 4, 48.0),
-            ("reference", 1536, 2048, 16, 96, 6, 8, 48.0),
+            ("draft", 96, 256, 6, 12, 1, 2, 16.0),
+            ("low", 160, 384, 8, 16, 1, 4, 24.0),
+            ("medium", 256, 768, 10, 24, 2, 16, 32.0),
+            ("high", 512, 1024, 12, 48, 4, 24, 48.0),
+            ("reference", 1536, 2048, 16, 96, 6, 32, 48.0),
         )
     }  # fmt: skip
     option_help: ClassVar[Mapping[str, str]] = {

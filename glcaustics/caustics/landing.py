@@ -8,12 +8,12 @@ none in a frame.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from glcaustics.caustics.branches import NO_EXIT, SOLID, branches_of, read_rgba32f
+from glcaustics.caustics.branches import NO_EXIT, SOLID, branches_of, read_rgba32f, solids_entered
 from glcaustics.caustics.map_warp import MapWarp, fit_warp
 from glcaustics.gpu import Device
 from glcaustics.graph import FrameGraph
@@ -23,7 +23,8 @@ from glcaustics.passes.geometry import boxes_of, points_of
 from glcaustics.passes.light_views import LightView
 from glcaustics.passes.receiver_views import CORE, ReceiverView, receiver_views
 from glcaustics.passes.runner import PlanRunner
-from glcaustics.scene.model import FloatArray, Light, OpticalKind
+from glcaustics.scene.mesh_tools import is_convex
+from glcaustics.scene.model import FloatArray, Instance, Light, OpticalKind
 
 if TYPE_CHECKING:
     from glcaustics.caustics.light_solve import LightMapMethod
@@ -36,8 +37,17 @@ CORE_CUTS = (
 )  # of the flux that may fall outside of a core, on each of its four sides; core within core
 CORE_AREA = 0.1  # of the window's area that a core may have at most: else one map serves as well
 CORE_BORDER = 0.1  # of a core's texels on each side
+LAYERED_SHARE = 0.01  # of the light in solids: from there on a second pair of their layers is drawn
 LOST_SHARE = 2.5e-4  # of the flux that may fall outside of the window, on each of its four sides
 AIR = {False: 0.02, True: 0.06}  # border of the window; more where the water moves
+
+
+@dataclass(frozen=True)
+class _InSolids:
+    """Shares of the flux that enters solids: `trapped` finds no way out; `entered` goes into another, and lands."""
+
+    trapped: float = 0.0
+    entered: float = 0.0
 
 
 def fit_receivers(
@@ -61,13 +71,18 @@ def fit_receivers(
     coarse_light = replace(light, caster=caster, receivers=receiver_views(everything, light.light, COARSE_MAP))
     coarse.lights = [coarse_light]
     shares: dict[str, float] = {}
-    for texels in (COARSE_MAP, int(setup.options["map_size"])):
-        landed, shares = _coarse_solve(method, device, coarse, coarse_light, frame)
+    trapped, solids = 0.0, _InSolids()
+    one_pair_serves = _one_pair_serves(everything)
+    for layers, texels in ((1, COARSE_MAP), (2, int(setup.options["map_size"]))):
+        method.set_layers(light, 1 if one_pair_serves else layers)
+        landed, shares, solids = _coarse_solve(method, device, coarse, coarse_light, frame)
         for name, (points, weights) in landed.items():
             if len(points):
                 seen_from = coarse_light.receivers[name].view.light
                 view = _window(seen_from, points, weights, texels, setup.is_animated, receivers, boxes)
                 coarse_light.receivers[name] = replace(coarse_light.receivers[name], view=view)
+        trapped = max(trapped, solids.trapped)
+    _decide_layers(method, light, one_pair_serves, trapped, solids.entered)
     light.receivers = coarse_light.receivers
     warps: dict[str, MapWarp] = {}
     for name, (points, weights) in landed.items():
@@ -114,7 +129,7 @@ def _core(
 
 def _coarse_solve(
     method: LightMapMethod, device: Device, setup: FrameSetup, light: LightSetup, frame: FrameState
-) -> tuple[dict[str, tuple[FloatArray, FloatArray]], dict[str, float]]:
+) -> tuple[dict[str, tuple[FloatArray, FloatArray]], dict[str, float], _InSolids]:
     """Landing points (N, 3) and their flux (N,) in each receiver view, and the landed share of each branch kind."""
     graph = FrameGraph()
     branches = branches_of(setup, light, method.name)
@@ -123,7 +138,7 @@ def _coarse_solve(
     points: dict[str, list[FloatArray]] = {}
     weights: dict[str, list[FloatArray]] = {}
     shares: dict[str, float] = {}
-    tried_flux, solid_flux, trapped_flux = 0.0, 0.0, 0.0
+    tried_flux, solid_flux, trapped_flux, entered_flux = 0.0, 0.0, 0.0, 0.0
     try:
         runner.run(frame)
         for branch in branches:
@@ -137,11 +152,48 @@ def _coarse_solve(
             if branch.kind == SOLID:
                 solid_flux += float(flux.sum())
                 trapped_flux += float(flux[landing[..., 3] == NO_EXIT].sum())
+                entered_flux += float(flux[solids_entered(landing[..., 3]) > 0].sum())
     finally:
         runner.release()
-    method.regard_trapped(light, trapped_flux / max(solid_flux, 1e-300))
+    solids = _InSolids(trapped_flux / max(solid_flux, 1e-300), entered_flux / max(solid_flux, 1e-300))
     landed = {name: (np.concatenate(points[name]), np.concatenate(weights[name])) for name in points}
-    return landed, {kind: flux / max(tried_flux, 1e-300) for kind, flux in shares.items()}
+    return landed, {kind: flux / max(tried_flux, 1e-300) for kind, flux in shares.items()}, solids
+
+
+def receivers_inside_solids(everything: tuple[Instance, ...]) -> bool:
+    """Whether a triangle of an opaque surface reaches into the box of a solid: light may end in there."""
+    boxes = boxes_of(i for i in everything if i.optical_kind is OpticalKind.SOLID)
+    if len(boxes) == 0:
+        return False
+    for instance in everything:
+        if instance.optical_kind is OpticalKind.DIFFUSE:
+            corners = instance.positions_ws()[instance.mesh.triangles]
+            low, high = corners.min(axis=1), corners.max(axis=1)
+            for box in boxes:
+                air = 1e-4 * (box[1] - box[0])  # what stands on a floor, or is cut from the same grid, touches
+                if ((low < box[1] - air) & (high > box[0] + air)).all(axis=1).any():
+                    return True
+    return False
+
+
+def _one_pair_serves(everything: tuple[Instance, ...]) -> bool:
+    """Whether there is at most one solid, and it is convex: light that leaves it meets no other."""
+    solids = [i for i in everything if i.optical_kind is OpticalKind.SOLID]
+    return all(is_convex(i.mesh.positions_m, i.mesh.triangles) for i in solids) if len(solids) < 2 else False
+
+
+def _decide_layers(
+    method: LightMapMethod, light: LightSetup, one_pair_serves: bool, trapped: float, entered: float
+) -> None:
+    """`trapped`, `entered`: of the flux in solids, what finds no way out by one pair, and what enters another."""
+    because = "the scene's only solid is convex"
+    if not one_pair_serves:
+        because = (
+            f"{100.0 * trapped:.2g} % of the light in solids finds no way out by one pair of layers, "
+            f"and {100.0 * entered:.2g} % enters another"
+        )
+    layers = 2 if not one_pair_serves and max(trapped, entered) > LAYERED_SHARE else 1
+    method.set_layers(light, layers, because)
 
 
 def _window(

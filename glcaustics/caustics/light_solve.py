@@ -13,7 +13,7 @@ import moderngl
 import numpy as np
 
 from glcaustics.caustics.branches import BRANCH_CODE, INTERFACE, REFLECT, SOLID, Branch, branches_of, solve_statistics
-from glcaustics.caustics.landing import fit_receivers
+from glcaustics.caustics.landing import fit_receivers, receivers_inside_solids
 from glcaustics.caustics.map_warp import SEGMENTS, TABLE_ROWS, MapWarp
 from glcaustics.caustics.method import CausticsMethod, irradiance_of
 from glcaustics.gpu import Device, Program
@@ -31,7 +31,6 @@ from glcaustics.scene.model import OpticalKind
 SHADERS = "caustics/shared"
 ESTIMATES = {"fixed_point": 0, "newton_fd": 1, "hybrid": 2}
 NEGLIGIBLE_SHARE = 5e-4  # a branch that brings less of a light's flux to the receivers is left out, and said so
-TRAPPED_SHARE = 0.01  # of the light in solids: from there on a second pair of their layers is drawn
 CORE_TAPS = 32  # on each side of a pixel: few pixels see a core, and those few may each see many of its texels
 SPLAT_SIGMA = 0.62  # of the distance to the neighbour: least blur at which a regular grid of splats is flat to 0.2 %
 
@@ -77,8 +76,9 @@ class LightMapMethod(CausticsMethod):
     def __init__(self) -> None:
         self._branches: dict[int, list[Branch]] = {}
         self._warps: dict[tuple[int, str], MapWarp] = {}
-        self._trapped: dict[int, float] = {}
-        self._layered: set[int] = set()
+        self._layers: dict[int, int] = {}
+        self._why_one_pair: dict[int, str] = {}
+        self._receivers_inside = False
         self._left_out: list[tuple[str, str]] = []
 
     @classmethod
@@ -138,6 +138,7 @@ class LightMapMethod(CausticsMethod):
 
     def prepare(self, device: Device, setup: FrameSetup, frame: FrameState) -> None:
         """Send a coarse light through the scene once, and fit each light's receiver views to where it lands."""
+        self._receivers_inside = receivers_inside_solids(setup.instances())
         for light in setup.lights:
             if light.caster is not None:
                 shares, warps = fit_receivers(self, device, setup, light, frame)
@@ -162,13 +163,12 @@ class LightMapMethod(CausticsMethod):
 
     def layers(self, light: LightSetup) -> int:
         """Pairs of front and back faces by which this light's way through solids is followed: 1, or 2."""
-        return 2 if light.index in self._layered else 1
+        return self._layers.get(light.index, 1)
 
-    def regard_trapped(self, light: LightSetup, share: float) -> None:
-        """`share`: of the flux in solids that finds no way out by one pair; above `TRAPPED_SHARE`, two are drawn."""
-        self._trapped[light.index] = share
-        if share > TRAPPED_SHARE:
-            self._layered.add(light.index)
+    def set_layers(self, light: LightSetup, layers: int, because: str = "") -> None:
+        """`because`: why one pair is enough."""
+        self._layers[light.index] = layers
+        self._why_one_pair[light.index] = because
 
     def leave_out(self, graph: FrameGraph, setup: FrameSetup, because: str) -> None:
         for light in setup.lights:
@@ -231,12 +231,7 @@ class LightMapMethod(CausticsMethod):
             if self.layers(light) == 2:
                 light_view.declare_caster_layers(graph, light)
             else:
-                share = self._trapped.get(light.index)
-                because = (
-                    "a coarse light decides before the first frame whether the solids need a second pair of layers"
-                    if share is None
-                    else f"{100.0 * share:.2g} % of the light in solids finds no way out by one pair of layers"
-                )
+                because = self._why_one_pair.get(light.index) or "a coarse light decides before the first frame"
                 graph.leave_out(f"caster_front2{light.resource('')}", because)
         else:
             graph.leave_out(f"caster_back{light.resource('')}", "nothing in the scene is a solid with two interfaces")
@@ -277,6 +272,7 @@ class LightMapMethod(CausticsMethod):
                 "RECEIVER_FACES": view.faces,
                 "BRANCH": BRANCH_CODE[branch.kind],
                 "LAYERS": self.layers(light) if branch.kind == SOLID else 1,
+                "RECEIVERS_INSIDE": int(branch.kind == SOLID and self._receivers_inside),
                 "HAS_MIRROR": int(branch.kind == REFLECT and OpticalKind.MIRROR in ctx.setup.kinds()),
                 "NAIVE_FLUX": int(options.get("naive_flux", False)),
                 "ESTIMATE": ESTIMATES[options["estimate"]],

@@ -28,7 +28,7 @@ def declare_caster(graph: FrameGraph, setup: FrameSetup, light: LightSetup) -> N
             f"caster_view{light.resource('')}",
             {
                 position: TextureDesc("rgba32f", size, "m"),
-                normal: TextureDesc("rgba32f", size),
+                normal: TextureDesc("rgba32f", size, filter="linear"),
                 depth: TextureDesc("depth24", size),
             },
             lambda ctx: _draw_caster(ctx, light, position, normal, depth),
@@ -61,14 +61,17 @@ def declare_caster_back(graph: FrameGraph, setup: FrameSetup, light: LightSetup)
 
 
 def declare_caster_layers(graph: FrameGraph, light: LightSetup) -> None:
-    """The second front face behind the first back face of the same solid, and the back face behind that (depth peeling,
-    Everitt 2001): what a solid with folds or handles shows the light a second time."""
-    _declare_behind(graph, light, "front2", "caster.back_position_ws", "back", "solids behind their own first layer")
+    """The second front face behind the first back face, and the back face behind that (depth peeling, Everitt 2001):
+    what a solid with folds or handles shows the light a second time, and other solids behind it."""
+    note = "solids behind the first layer of solids"
+    _declare_behind(graph, light, "front2", "caster.back_position_ws", "back", note, any_object=True)
     _declare_behind(graph, light, "back2", "caster.front2_position_ws", "front", "where that layer ends")
 
 
-def _declare_behind(graph: FrameGraph, light: LightSetup, name: str, before: str, cull: str, note: str) -> None:
-    """The first faces of each texel's solid behind what is in `before`; `cull`: the faces that do not count."""
+def _declare_behind(
+    graph: FrameGraph, light: LightSetup, name: str, before: str, cull: str, note: str, *, any_object: bool = False
+) -> None:
+    """The first faces behind what is in `before`, of the same solid or of any; `cull`: the faces that do not count."""
     assert light.caster is not None
     size = light.caster.size
     front = light.resource(before)
@@ -81,7 +84,7 @@ def _declare_behind(graph: FrameGraph, light: LightSetup, name: str, before: str
                 normal: TextureDesc("rgba32f", size, filter="linear"),
                 depth: TextureDesc("depth24", size),
             },
-            lambda ctx: _draw_behind(ctx, light, front, (position, normal, depth), cull),
+            lambda ctx: _draw_behind(ctx, light, front, (position, normal, depth), cull, any_object),
             reads=(front,),
             always_writes=(depth,),
             note=note,
@@ -89,13 +92,15 @@ def _declare_behind(graph: FrameGraph, light: LightSetup, name: str, before: str
     )
 
 
-def _draw_behind(ctx: PassContext, light: LightSetup, front: str, names: tuple[str, str, str], cull: str) -> None:
+def _draw_behind(
+    ctx: PassContext, light: LightSetup, front: str, names: tuple[str, str, str], cull: str, any_object: bool
+) -> None:
     assert light.caster is not None
     position, normal, depth = names
     target = ctx.target(position, normal, depth=depth)
     target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
     outputs = {**ctx.locations(POSITION=position, NORMAL=normal), "HAS_PLANE": 0}
-    program = ctx.device.program(SHADER, {**outputs, "BACK": 1, "OCCLUDER": 0, "CLIP": 0})
+    program = ctx.device.program(SHADER, {**outputs, "BACK": 1 + any_object, "OCCLUDER": 0, "CLIP": 0})
     program.set(t_front_position=ctx.texture(front), u_light=light.caster.light_vec4)
     _draw_kind(ctx, light.caster, program, target, ctx.frame.gpu.select(OpticalKind.SOLID), cull=cull)
 

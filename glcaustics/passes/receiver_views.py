@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,11 +47,27 @@ def receiver_views(everything: tuple[Instance, ...], light: Light, texels: int) 
     views = {BESIDE: ReceiverView(BESIDE, fit_view(light, receivers, texels, boxes_ws=boxes))}
     if interfaces:
         virtual, plane = light_below(interfaces, light)
-        under = receivers if plane is None else receivers[receivers @ np.asarray(plane[:3]) + plane[3] > 0.0]
-        if plane is not None and len(under) == 0:
+        under = receivers if plane is None else points_under(diffuse, plane)
+        if len(under) == 0:
             under = receivers
         views[BELOW] = ReceiverView(BELOW, fit_view(virtual, under, texels, boxes_ws=boxes), plane)
     return views
+
+
+def points_under(instances: Iterable[Instance], plane: tuple[float, float, float, float]) -> FloatArray:
+    """Points (N, 3) whose hull holds what lies on the positive side of a plane (a, b, c, d): vertices, and where edges
+    cross it. Of a large floor that a tilted sheet's plane cuts, the vertices alone would leave out all but a corner.
+    """
+    parts = [np.zeros((0, 3))]
+    for instance in instances:
+        points = instance.positions_ws()
+        side = points @ np.asarray(plane[:3]) + plane[3]
+        parts.append(points[side > 0.0])
+        edges = instance.mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64)
+        a, b = edges[(side[edges] > 0.0).sum(axis=1) == 1].T
+        along = (side[a] / (side[a] - side[b]))[:, None]
+        parts.append(points[a] + along * (points[b] - points[a]))
+    return np.concatenate(parts)
 
 
 def light_below(interfaces: list[Instance], light: Light) -> tuple[Light, tuple[float, float, float, float] | None]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from glcaustics.scene.model import FloatArray, IntArray
 
+CONVEX_TOLERANCE = 1e-4  # of the mesh's extent: what an edge may bend inwards by rounding
 WELD_TOLERANCE = 1e-6  # of the mesh's extent: what a modeller's rounding moves the two sides of a uv seam apart
 CREASE_ANGLE_RAD = math.radians(60.0)  # edges that bend more than this stay sharp when normals are computed
 SLIVER_RATIO = 1e-7  # height over longest edge below which a triangle is rounding noise of float32
@@ -148,6 +149,32 @@ def enclosure(positions_m: FloatArray, triangles: IntArray) -> float:
     vectors = _area_vectors(positions_m, triangles)
     total = float(np.linalg.norm(vectors, axis=1).sum())
     return 1.0 - float(np.linalg.norm(vectors.sum(axis=0))) / total if total > 0.0 else 0.0
+
+
+def is_convex(positions_m: FloatArray, triangles: IntArray) -> bool:
+    """Whether a watertight mesh is one convex body: no edge bends inwards, and it is all in one piece.
+
+    Inwards counts from `CONVEX_TOLERANCE` of the extent on, since rounded vertices of a flat face bend both ways.
+    """
+    points = np.asarray(positions_m, np.float64)
+    corners = weld(points)[triangles]
+    corners = corners[~(corners == np.roll(corners, 1, axis=1)).any(axis=1)]
+    if len(corners) == 0:
+        return False
+    edges = directed_edges(corners)
+    owner, opposite = np.repeat(np.arange(len(corners)), 3), np.roll(corners, 1, axis=1).ravel()
+    low, high = edges.min(axis=1), edges.max(axis=1)
+    order = np.lexsort((low, high))
+    pairs = order.reshape(-1, 2) if len(order) % 2 == 0 else None
+    if pairs is None or (low[pairs[:, 0]] != low[pairs[:, 1]]).any() or (high[pairs[:, 0]] != high[pairs[:, 1]]).any():
+        return False
+    faces = face_normals(points, corners)[owner[pairs[:, 0]]]
+    above = np.einsum("ei,ei->e", faces, points[opposite[pairs[:, 1]]] - points[corners[owner[pairs[:, 0]], 0]])
+    if above.max() > CONVEX_TOLERANCE * float(np.ptp(points, axis=0).max()):
+        return False
+    used, index = np.unique(edges, return_inverse=True)
+    index = index.reshape(-1, 2)
+    return len(np.unique(_components(index[:, 0], index[:, 1], len(used)))) == 1
 
 
 def nondegenerate(positions_m: FloatArray, triangles: IntArray) -> IntArray:

@@ -10,6 +10,8 @@
 #define GLC_TIR -1
 #define GLC_NO_EXIT -4
 #define GLC_BETWEEN_FACETS -11   // scattered into the rough surface that it came from
+#define GLC_LEAVES 0
+#define GLC_STAYS 1
 
 // Where a ray inside the solid leaves it: the stretch behind its front and before its back faces ends. Needed where the back faces
 // alone give no answer, and after a total reflection, when the way out may be through the front.
@@ -52,9 +54,31 @@ GlcHit glc_leave_inside(sampler2D t_front, sampler2D t_front_normal, sampler2D t
     return hit;
 }
 
+// What light inside does where it meets the surface: it leaves (GLC_LEAVES) or is thrown back (GLC_STAYS), and `ray` is turned, `flux`
+// scaled; or GLC_BETWEEN_FACETS. n: unit normal of the surface against the ray; alpha > 0: rough, a microfacet's normal (brdf.glsl) for xi.
+int glc_meet_from_inside(vec3 n, float ior, float alpha, vec2 xi, inout vec3 ray, inout vec3 flux) {
+    vec3 facet = alpha > 0.0 ? glc_ggx_visible_normal(n, -ray, alpha, xi) : n;
+    vec3 outside;
+    float reflected_share = glc_fresnel_dielectric(-dot(facet, ray), 1.0 / ior);
+    bool leaves = glc_refract(ray, facet, 1.0 / ior, outside);  // else the mirror direction
+    ray = outside;
+    if (alpha > 0.0) {
+        float cos_out = dot(ray, n) * (leaves ? -1.0 : 1.0);
+        if (cos_out <= 0.0) return GLC_BETWEEN_FACETS;
+        flux *= glc_ggx_visible_share(cos_out, alpha);
+    }
+    if (!leaves) return GLC_STAYS;
+    flux *= 1.0 - reflected_share;
+    return GLC_LEAVES;
+}
+
+// Sub-texel normal of a back face, against the ray: bilinear over the stored ones; empty texels are zero and drop out of the sum.
+vec3 glc_back_normal(sampler2D t_back_normal, GlcView view, GlcHit exit) {
+    return -glc_safe_normalize(textureLod(t_back_normal, glc_view_project(view, exit.position_ws).xy / view.size, 0.0).xyz, exit.normal_ws);
+}
+
 // From the first interface to beyond the last one: p and ray are moved there, flux is what is left, iterations the look-ups.
-// bounces: total reflections that are followed. Returns 0, or why the light is lost.
-// alpha > 0: rough surfaces, a microfacet's normal (brdf.glsl) for xi at each of them.
+// bounces: total reflections that are followed. Returns 0, or why the light is lost. alpha, xi: see glc_meet_from_inside.
 int glc_pass_rough_solid(sampler2D t_front, sampler2D t_front_normal, sampler2D t_back, sampler2D t_back_normal, GlcView view,
                          vec3 box_min, vec3 box_max, vec3 sigma_a, float ior, int estimate, int max_iterations, int march_steps,
                          int bounces, float alpha, vec2 xi, inout vec3 p, inout vec3 ray, inout vec3 flux, inout float iterations) {
@@ -68,39 +92,13 @@ int glc_pass_rough_solid(sampler2D t_front, sampler2D t_front_normal, sampler2D 
             if (exit.status <= 0) return GLC_NO_EXIT;
         }
         flux *= glc_transmittance(sigma_a, exit.t);
-        // Sub-texel normal on the back: bilinear over the stored ones; empty texels are zero and drop out of the sum.
-        vec3 n = -exit.normal_ws;
-        if (bounce == 0) {
-            vec3 projected = glc_view_project(view, exit.position_ws);
-            n = -glc_safe_normalize(textureLod(t_back_normal, projected.xy / view.size, 0.0).xyz, exit.normal_ws);
-        }
+        vec3 n = bounce == 0 ? glc_back_normal(t_back_normal, view, exit) : -exit.normal_ws;
         if (dot(n, ray) > 0.0) n = -n;
-        vec3 surface_n = n;
-        if (alpha > 0.0) n = glc_ggx_visible_normal(n, -ray, alpha, fract(xi + float(bounce) * vec2(0.61803399, 0.41421356)));
-        vec3 outside;
-        float reflected_share = glc_fresnel_dielectric(-dot(n, ray), 1.0 / ior);
-        bool leaves = glc_refract(ray, n, 1.0 / ior, outside);  // else the mirror direction
         p = exit.position_ws;
-        ray = outside;
-        if (alpha > 0.0) {
-            float cos_out = dot(ray, surface_n) * (leaves ? -1.0 : 1.0);
-            if (cos_out <= 0.0) return GLC_BETWEEN_FACETS;
-            flux *= glc_ggx_visible_share(cos_out, alpha);
-        }
-        if (leaves) {
-            flux *= 1.0 - reflected_share;
-            return 0;
-        }
+        int met = glc_meet_from_inside(n, ior, alpha, fract(xi + float(bounce) * vec2(0.61803399, 0.41421356)), ray, flux);
+        if (met != GLC_STAYS) return met;
         t_max = glc_box_exit(p, ray, box_min, box_max);
         exit.status = 0;
     }
     return GLC_TIR;
-}
-
-// The same with smooth surfaces.
-int glc_pass_solid(sampler2D t_front, sampler2D t_front_normal, sampler2D t_back, sampler2D t_back_normal, GlcView view,
-                   vec3 box_min, vec3 box_max, vec3 sigma_a, float ior, int estimate, int max_iterations, int march_steps,
-                   int bounces, inout vec3 p, inout vec3 ray, inout vec3 flux, inout float iterations) {
-    return glc_pass_rough_solid(t_front, t_front_normal, t_back, t_back_normal, view, box_min, box_max, sigma_a, ior, estimate,
-                                max_iterations, march_steps, bounces, 0.0, vec2(0.0), p, ray, flux, iterations);
 }

@@ -120,3 +120,15 @@ def test_crease_keeps_smooth_sides_and_sharp_caps_of_a_cylinder() -> None:
     assert np.allclose(np.abs(split.normals[upright, 1]), 1.0)
     outward = positions[split.source][~upright] * (1.0, 0.0, 1.0)
     assert np.allclose(split.normals[~upright], outward)
+
+
+def test_convex_bodies_are_told_from_others() -> None:
+    box, ring = arrays(cube()), arrays(torus())
+    apart = np.concatenate((box[0], box[0] + 3.0)), np.concatenate((box[1], box[1] + len(box[0])))
+    dented = box[0].copy()
+    dented[-1] *= 0.2
+    assert tools.is_convex(*box) and tools.is_convex(box[0] * (1.0, 100.0, 0.01), box[1])
+    assert not tools.is_convex(*ring)
+    assert not tools.is_convex(*apart), "two pieces"
+    assert not tools.is_convex(dented, box[1])
+    assert not tools.is_convex(box[0], box[1][1:]), "a hole"

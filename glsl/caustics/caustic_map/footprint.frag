@@ -53,7 +53,8 @@ vec3 difference(ivec2 texel, ivec2 step, vec4 here, float object, out bool valid
     if (there / tile != texel / tile) return vec3(0.0);   // another face of the cube: no neighbour
 #endif
     vec4 landing = texelFetch(t_landing, there, 0);
-    valid = landing.w > 0.0 && texelFetch(t_caster_position, there, 0).w == object;
+    bool same_path = floor(0.5 * (landing.w - 1.0)) == floor(0.5 * (here.w - 1.0));
+    valid = landing.w > 0.0 && same_path && texelFetch(t_caster_position, there, 0).w == object;
     return valid ? landing.xyz - here.xyz : vec3(0.0);
 }
 

@@ -27,5 +27,6 @@ void main() {
 #else
     vec2 place = glc_view_project_on(view, landing.xyz, face).xy;
 #endif
-    o_projected = vec4(place, 8.0 * caster.w + float(face), spread);
+    float key = 64.0 * caster.w + floor(0.5 * (landing.w - 1.0));  // one sheet: the same object, and the same path through solids
+    o_projected = vec4(place, 8.0 * key + float(face), spread);
 }

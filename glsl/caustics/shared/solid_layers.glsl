@@ -1,6 +1,6 @@
-// A ray's way through a solid of many layers (folds, handles, cavities): `glc_pass_solid` for two pairs of front and back faces, the
-// second one peeled from behind the first (Everitt 2001, "Interactive order-independent transparency"). What is inside of
-// neither pair is taken for outside; a solid with more layers still loses light there, and it is counted.
+// Solids as two pairs of front and back faces in a light's view, the second one peeled from behind the first (Everitt 2001,
+// "Interactive order-independent transparency"): folds, handles, cavities, and other solids behind. What is inside of neither pair
+// is taken for outside; a solid with more layers still loses light there, and it is counted.
 #include "common/solid_path.glsl"
 
 uniform sampler2D t_front2_position;
@@ -27,7 +27,7 @@ Layers layers_at(GlcView view, vec3 p_ws, float object) {
     face[3] = texelFetch(t_back2_position, layers.texel, 0);
     float here = glc_light_distance(view, p_ws), best = 0.0;
     for (int k = 0; k < 4; k += 2) {
-        if (face[k].w != object || face[k + 1].w != object) continue;
+        if (face[k].w != object || face[k + 1].w != object) continue;  // another solid's
         vec2 gap = vec2(glc_light_distance(view, face[k].xyz), glc_light_distance(view, face[k + 1].xyz)) - here;
         if (gap.x <= 0.0 && gap.y >= 0.0) layers.inside = true;
         for (int i = 0; i < 2; ++i)
@@ -91,34 +91,33 @@ GlcHit leave_layers(GlcView view, float object, vec3 o, vec3 d, float t_max, int
     return hit;
 }
 
-// As `glc_pass_solid`.
-int pass_layers(GlcView view, float object, vec3 box_min, vec3 box_max, vec3 sigma_a, float ior, int estimate, int max_iterations,
-                int march_steps, int bounces, inout vec3 p, inout vec3 ray, inout vec3 flux, inout float iterations) {
-    float t_max = glc_box_exit(p, ray, box_min, box_max);
-    GlcHit exit = glc_intersect(t_back_position, t_back_normal, view, p, ray, t_max, estimate, max_iterations, 0);
-    iterations += float(exit.iterations);
-    for (int bounce = 0; bounce <= bounces; ++bounce) {
-        bool first = exit.status > 0;
-        if (!first) {
-            exit = leave_layers(view, object, p, ray, t_max, march_steps);
-            iterations += float(exit.iterations);
-            if (exit.status <= 0) return GLC_NO_EXIT;
-        }
-        flux *= glc_transmittance(sigma_a, exit.t);
-        vec3 n = -exit.normal_ws;
-        if (first) n = -glc_safe_normalize(textureLod(t_back_normal, glc_view_project(view, exit.position_ws).xy / view.size, 0.0).xyz, exit.normal_ws);
-        if (dot(n, ray) > 0.0) n = -n;
-        float reflected_share = glc_fresnel_dielectric(-dot(n, ray), 1.0 / ior);
-        vec3 outside;
-        bool leaves = glc_refract(ray, n, 1.0 / ior, outside);
-        p = exit.position_ws;
-        ray = outside;
-        if (leaves) {
-            flux *= 1.0 - reflected_share;
-            return 0;
-        }
-        t_max = glc_box_exit(p, ray, box_min, box_max);
-        exit.status = 0;
+// The next solid that a ray in the open meets: status <= 0 if there is none. `object`: its number + 1. The first front faces are met
+// beside their own texel, the second ones behind the first pair.
+GlcHit enter_layers(GlcView view, vec3 o, vec3 d, float t_max, int estimate, int max_iterations, int march_steps, out float object) {
+    object = 0.0;
+    GlcHit next = GlcHit(t_max, o, -d, 0, GLC_LEFT);
+    if (t_max <= 0.0) return next;
+    GlcHit behind = glc_intersect(t_front2_position, t_front2_normal, view, o, d, t_max, estimate, max_iterations, march_steps);
+    GlcHit beside = glc_intersect(t_caster_position, t_caster_normal, view, o, d, t_max, estimate, max_iterations, march_steps);
+    int iterations = behind.iterations + beside.iterations;
+    if (behind.status > 0 && dot(behind.normal_ws, d) < 0.0) {
+        next = behind;
+        vec3 projected = glc_view_project(view, next.position_ws);
+        object = texelFetch(t_front2_position, ivec2(projected.xy), 0).w;
+        vec3 between = glc_safe_normalize(textureLod(t_front2_normal, projected.xy / view.size, 0.0).xyz, next.normal_ws);
+        if (dot(between, next.normal_ws) > 0.9) next.normal_ws = between;
     }
-    return GLC_TIR;
+    if (beside.status > 0 && dot(beside.normal_ws, d) < 0.0 && (object == 0.0 || beside.t < next.t)) {
+        vec3 projected = glc_view_project(view, beside.position_ws);
+        float other = texelFetch(t_caster_position, ivec2(projected.xy), 0).w;
+        if (other > 0.0 && glc_object(int(other + 0.5) - 1).kind == GLC_SOLID) {
+            next = beside;
+            object = other;
+            vec3 between = glc_safe_normalize(textureLod(t_caster_normal, projected.xy / view.size, 0.0).xyz, next.normal_ws);
+            if (dot(between, next.normal_ws) > 0.9) next.normal_ws = between;
+        }
+    }
+    next.iterations = iterations;
+    if (object == 0.0) next.status = GLC_LEFT;
+    return next;
 }

@@ -22,26 +22,21 @@ uniform sampler2D t_receiver_normal;
 uniform sampler2D t_back_position;
 uniform sampler2D t_back_normal;
 #endif
-#if LAYERS == 2
-#include "caustics/shared/solid_layers.glsl"
-#endif
 uniform vec3 u_bounds_min_ws;      // box around all receivers
 uniform vec3 u_bounds_max_ws;
-#if BRANCH == GLC_IN_AND_OUT
-uniform vec3 u_caster_min_ws;      // box around the solids
-uniform vec3 u_caster_max_ws;
-uniform int u_internal_bounces;    // total reflections that are followed
-#endif
 uniform vec3 u_channels;           // 1 for the colour channels that this branch carries, else 0
 uniform int u_channel;             // channel whose index of refraction is used
 uniform int u_max_iterations;
 uniform int u_march_steps;
+#if BRANCH == GLC_IN_AND_OUT
+#include "caustics/shared/solid_way.glsl"
+#endif
 #if NAIVE_FLUX
 uniform float u_inverse_texels;    // 1 / V: number of texels the casters cover
 uniform float u_caster_area_m2;    // total flux is kept comparable: E_perp x this
 #endif
 
-layout(location = 0) out vec4 o_landing;  // xyz: landing point, metres, world; w: status (see intersect.glsl; GLC_TIR; 0 = no caster)
+layout(location = 0) out vec4 o_landing;  // xyz: landing point, metres, world; w: status (intersect.glsl; GLC_TIR; 0 = no caster), where it lands plus 2 x path
 layout(location = 1) out vec4 o_flux;     // rgb: flux (carried, or lost when status < 0), W or lm; w: look-ups
 
 #define GLC_DARK -5
@@ -87,7 +82,7 @@ void main() {
     if (from_dense && u_light.w != 0.0) flux *= glc_transmittance(object.sigma_a, length(p - u_light.xyz));
 
     vec3 ray = reflect(d, n);
-    float iterations = 0.0;
+    float iterations = 0.0, path = 0.0;
 #if BRANCH == GLC_REFLECT
     vec3 reflectance = object.kind == GLC_MIRROR ? glc_fresnel_metal(object.base_color, n_dot_l)
                                                  : vec3(glc_fresnel_dielectric(n_dot_l, eta));
@@ -99,21 +94,26 @@ void main() {
     flux *= transmitted_share;
     bool in_absorber = object.kind == GLC_INTERFACE && !from_dense;
 #if BRANCH == GLC_IN_AND_OUT
-#if LAYERS == 2
-    int lost = pass_layers(caster_view, caster.w, u_caster_min_ws, u_caster_max_ws, object.sigma_a, ior, ESTIMATE, u_max_iterations,
-                           u_march_steps, u_internal_bounces, p, ray, flux, iterations);
-#else
-    int lost = glc_pass_solid(t_caster_position, t_caster_normal, t_back_position, t_back_normal, caster_view, u_caster_min_ws,
-                              u_caster_max_ws, object.sigma_a, ior, ESTIMATE, u_max_iterations, u_march_steps, u_internal_bounces,
-                              p, ray, flux, iterations);
-#endif
-    if (lost != 0) { o_landing.w = float(lost); o_flux = vec4(flux, iterations); return; }
+    SolidWay way = SolidWay(p, ray, flux, caster.w, object.sigma_a, ior, 0, 0, 0.0, GlcHit(0.0, p, -ray, 0, GLC_LEFT));
+    int passed = pass_solids(caster_view, receiver_view, way);
+    p = way.p_ws;
+    ray = way.ray;
+    flux = way.flux;
+    iterations = way.iterations;
+    path = float(min(way.reflections, 7) + 8 * min(way.solids, 7));
+    if (passed < 0) { o_landing.w = float(passed); o_flux = vec4(flux, iterations); return; }
 #endif
 #endif
     if (max(flux.r, max(flux.g, flux.b)) <= 0.0) { o_landing.w = float(GLC_DARK); return; }
 
     float t_max = glc_box_exit(p, ray, u_bounds_min_ws, u_bounds_max_ws);
     GlcHit hit = GlcHit(0.0, p, -ray, 0, GLC_LEFT);
+#if BRANCH == GLC_IN_AND_OUT
+    hit = way.landed;
+    // Where the solid touches a receiver, rounding may have put the exit behind it.
+    if (passed != GLC_LANDED) p -= ray * glc_texel_width(caster_view, p);
+    if (passed != GLC_LANDED)
+#endif
     if (t_max > 0.0) {
 #if BRANCH == GLC_REFLECT
         // A reflected ray leaves the light's direction altogether: the fixed point has no reason to contract there.
@@ -137,6 +137,6 @@ void main() {
     // The map stores the side that the light sees: what arrives at the other side of an opaque surface stays there.
     vec3 direct = glc_light_direction(receiver_view, hit.position_ws);
     if (hit.status > 0 && dot(hit.normal_ws, ray) * dot(hit.normal_ws, direct) < 0.0) hit.status = GLC_HIDDEN;
-    o_landing = vec4(hit.position_ws, float(hit.status));
+    o_landing = vec4(hit.position_ws, float(hit.status) + (hit.status > 0 ? 2.0 * path : 0.0));
     o_flux = vec4(flux, iterations + float(hit.iterations));
 }

@@ -1,6 +1,6 @@
 // Position and normal of the first surface seen from a light. position.w = object index + 1 (0: nothing there);
 // normal.w: positive on the front of the triangle, negative on its back; |w| - 1 = change of the normal over one texel. The normal is the mesh's own, not turned to the light.
-// OCCLUDER 1: opaque geometry in the way, stored as nothing. CLIP 1: a half-space is cut away. BACK 1: the first back face of the same object behind its front.
+// OCCLUDER 1: opaque geometry in the way, stored as nothing. CLIP 1: a half-space is cut away. BACK 1: the first back face of the same object behind its front; BACK 2: of any object.
 #include "common/optics.glsl"
 
 in vec3 v_position_ws;
@@ -53,7 +53,11 @@ void main() {
 #endif
 #if BACK
     vec4 front = texelFetch(t_front_position, ivec2(gl_FragCoord.xy), 0);
+#if BACK == 2
+    if (front.w == 0.0) discard;
+#else
     if (front.w != position.w) discard;
+#endif
     vec3 d = v_position_ws - front.xyz;
     vec3 l = u_light.w == 0.0 ? u_light.xyz : v_position_ws - u_light.xyz;
     if (dot(d, l) <= 0.0) discard;
