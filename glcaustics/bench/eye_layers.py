@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import statistics
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from glcaustics.bench.convergence import seeded_cameras
-from glcaustics.bench.eye_truth import cast_rays, has_open_surface
+from glcaustics.bench.eye_truth import MANY, cast_rays, has_open_surface
 from glcaustics.bench.scene_export import opaque_caster
 from glcaustics.bench.solver_variants import scene_buffers
 from glcaustics.errors import UsageError
@@ -63,44 +63,40 @@ def eye_layers(
     with create_device(backend) as device:
         ends = cast_rays(opaque_caster(scene.instances_at(0.0)), scene_buffers(device, scene, camera, size))
     truth, found = ends.picture(ends.px), ends.picture(ends.inside)
+    if not found.any():
+        raise UsageError(f"no refracted ray of scene '{scene.name}' ends within the picture", where="eye_layers")
     still = replace(scene, camera=camera, camera_at=None)
-    shares: dict[int, LayerShares] = {}
+
+    def renderer_with(layers: int) -> Renderer:
+        options = {"depth_layers": layers, "refraction_steps": MANY}
+        aovs = ("solve_status", "solve_hit")
+        return Renderer(still, size, method, backend=backend, keep=False, aovs=aovs, options=options)
+
     with ExitStack() as stack:
-        made = {
-            layers: stack.enter_context(
-                Renderer(
-                    still,
-                    size,
-                    method,
-                    backend=backend,
-                    keep=False,
-                    aovs=("solve_status", "solve_hit"),
-                    options={"depth_layers": layers, "refraction_steps": 16384},
-                )
-            )
-            for layers in (1, 2)
-        }
+        made = {layers: stack.enter_context(renderer_with(layers)) for layers in (1, 2)}
         pictures = {layers: renderer.render().aov for layers, renderer in made.items()}
         costs = _costs(made, rounds)
         for renderer in made.values():
             renderer.device.make_current()
-    if not found.any():
-        raise UsageError(f"no refracted ray of scene '{scene.name}' ends within the picture", where="eye_layers")
-    for layers, aov in pictures.items():
-        status = aov["solve_status"][::-1][found]
-        px = aov["solve_hit"][::-1][found][:, :2] * np.asarray(size)
-        near, solved = np.abs(px - truth[found]).max(axis=1) <= 1.0, np.isin(status, SOLVED)
-        second = status == SECOND
-        shares[layers] = LayerShares(
-            int(found.sum()),
-            float((solved & near).mean()),
-            float((solved & ~near).mean()),
-            float((status == HIDDEN).mean()),
-            float(second.mean()),
-            float(near[second].mean()) if second.any() else 0.0,
-            costs[layers] / costs[1],
-        )
-    return shares
+    return {layers: _shares(aov, truth, found, costs[layers] / costs[1]) for layers, aov in pictures.items()}
+
+
+def _shares(aov: Mapping[str, np.ndarray], truth: FloatArray, found: BoolArray, cost: float) -> LayerShares:
+    """How a picture's AOVs compare with the true pixels (H, W, 2) where there are any, (H, W); rows lowest first."""
+    height, width = found.shape
+    status = aov["solve_status"][::-1][found]
+    px = aov["solve_hit"][::-1][found][:, :2] * np.array([width, height])
+    near, solved = np.abs(px - truth[found]).max(axis=1) <= 1.0, np.isin(status, SOLVED)
+    second = status == SECOND
+    return LayerShares(
+        rays=int(found.sum()),
+        right=float((solved & near).mean()),
+        wrong=float((solved & ~near).mean()),
+        hidden=float((status == HIDDEN).mean()),
+        second=float(second.mean()),
+        second_right=float(near[second].mean()) if second.any() else 0.0,
+        cost=cost,
+    )
 
 
 def _costs(made: dict[int, Renderer], rounds: int) -> dict[int, float]:

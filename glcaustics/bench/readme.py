@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from glcaustics.bench.analysis import caustics_ms
@@ -10,6 +10,11 @@ from glcaustics.bench.equal_error import DENOISED, PTRACER, equal_error, ratio_t
 from glcaustics.errors import UsageError
 
 _NAMES = ("scene", "method", "quality")
+_HEAD = (
+    *_NAMES,
+    *("relative RMSE", "without foci", "FLIP", "bias", "frame ms", "of it caustics"),
+    *("times faster than ptracer", "than ptracer + OIDN"),
+)
 
 
 def table(report: Mapping[str, Any]) -> str:
@@ -24,47 +29,41 @@ def table(report: Mapping[str, Any]) -> str:
         raise UsageError("the report has no measurement of a target", where="--table", remedy=remedy)
     pixels = max(r["pixels"] for r in rows)
     rows = [r for r in rows if r["pixels"] == pixels]
-    names = [
-        "scene",
-        "method",
-        "quality",
-        "relative RMSE",
-        "without foci",
-        "FLIP",
-        "bias",
-        "frame ms",
-        "of it caustics",
-    ]
-    head = " | ".join(["", *names, "times faster than ptracer", "than ptracer + OIDN", ""]).strip()
     entries = {tuple(e[k] for k in _NAMES): e for e in equal_error(rows)}
-    lines = [head, "|" + "---|" * 11]
+    lines = [f"| {' | '.join(_HEAD)} |", "|" + "---|" * len(_HEAD)]
     for row in rows:
-        if row["tool"] != "glcaustics" or row["method"] == "none":
-            continue
-        e = row["errors"]
-        own = caustics_ms(rows, row)
-        entry = entries.get(tuple(row[k] for k in _NAMES))
-        peers = [ratio_text(entry, peer).replace("extrapolated", "extr.") for peer in (PTRACER, DENOISED)]
-        cells = [row["scene"], row["method"], row["quality"]]
-        cells += [_number(e.get(name), ".4f") for name in ("rrmse", "rrmse_regular", "flip")]
-        cells += [_number(e.get("bias"), "+.2%")]
-        cells += [f"{row['time_ms']['median']:.0f}", _number(own, ".0f"), *peers]
-        lines.append("| " + " | ".join(cells) + " |")
-    state = report["machine"]
-    several = max((r.get("frames", 1) for r in rows), default=1)
-    still = (
-        f" Noisy methods: error after {several} frames of a still, which all count for the ratio."
-        if several > 1
-        else ""
-    )
-    commit = str(report["commit"] or "no checkout")[:10] + (" with changes" if report["dirty"] else "")
-    clock = next(r["time_ms"]["clock"] for r in rows if r["tool"] == "glcaustics")
-    lines += [
-        "",
-        f"Irradiance at {pixels}x{pixels} of each scene's target; {state['gl_renderer']} by {clock}, {state['cpu']}, "
-        f"{state['cores']} cores; commit {commit}; `{report['command']}`.{still}",
+        if row["tool"] == "glcaustics" and row["method"] != "none":
+            entry = entries.get(tuple(row[k] for k in _NAMES))
+            lines.append(f"| {' | '.join(_cells(row, caustics_ms(rows, row), entry))} |")
+    return "\n".join([*lines, "", _origin(report, rows)])
+
+
+def _cells(row: Mapping[str, Any], caustics_ms: float | None, entry: dict[str, Any] | None) -> list[str]:
+    errors = row["errors"]
+    return [
+        *(row[name] for name in _NAMES),
+        *(_number(errors.get(name), ".4f") for name in ("rrmse", "rrmse_regular", "flip")),
+        _number(errors.get("bias"), "+.2%"),
+        f"{row['time_ms']['median']:.0f}",
+        _number(caustics_ms, ".0f"),
+        *(ratio_text(entry, peer).replace("extrapolated", "extr.") for peer in (PTRACER, DENOISED)),
     ]
-    return "\n".join(lines)
+
+
+def _origin(report: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> str:
+    """What was measured, with what, where and by which command."""
+    state = report["machine"]
+    commit = str(report["commit"] or "no checkout")[:10] + (" with changes" if report["dirty"] else "")
+    side = rows[0]["pixels"]
+    clock = next(r["time_ms"]["clock"] for r in rows if r["tool"] == "glcaustics")
+    text = (
+        f"Irradiance at {side}x{side} of each scene's target; {state['gl_renderer']} by {clock}, "
+        f"{state['cpu']}, {state['cores']} cores; commit {commit}; `{report['command']}`."
+    )
+    frames = max(r.get("frames", 1) for r in rows)
+    if frames > 1:
+        text += f" Noisy methods: error after {frames} frames of a still, which all count for the ratio."
+    return text
 
 
 def _number(value: float | None, form: str) -> str:

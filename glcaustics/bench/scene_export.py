@@ -7,13 +7,12 @@ from collections.abc import Iterable
 import numpy as np
 import numpy.typing as npt
 
-from glcaustics.errors import SceneError, UsageError
+from glcaustics.errors import SceneError
 from glcaustics.optics.beam_scene import BeamLight, BeamMesh, BeamScene, BeamWater, SurfaceKind, SurfaceOptics
 from glcaustics.optics.beam_spread import RoughOptics, SizedBeamLight
 from glcaustics.optics.beams import HeightField
 from glcaustics.optics.raycast import RayCaster
-from glcaustics.optics.receivers import PlaneGrid
-from glcaustics.scene.model import Camera, Instance, Light, LightKind, Material, OpticalKind, Scene, WaterBody
+from glcaustics.scene.model import Instance, Light, LightKind, Material, OpticalKind, Scene, WaterBody
 from glcaustics.scene.water import WaveSurface, surface_of
 
 FloatArray = npt.NDArray[np.float64]
@@ -139,59 +138,6 @@ def _analytic(body: WaterBody, time_s: float, facets: int | None) -> BeamWater |
         bound,
         _optics(OpticalKind.INTERFACE, body.material, facets),
     )
-
-
-# Receivers
-
-
-def receiver_plane(
-    scene: Scene, name: str, size: tuple[int, int], normal_ws: tuple[float, float, float] = (0.0, 1.0, 0.0)
-) -> PlaneGrid:
-    """The outermost flat face of an instance along `normal_ws` as a grid of `size` (width, height) pixels.
-
-    A face that looks up has u along +x and v along +z.
-
-    Raises:
-        UsageError: no such instance, or it has no face that looks there.
-    """
-    instance = next((i for i in scene.instances if i.name == name), None)
-    if instance is None:
-        names = ", ".join(i.name for i in scene.instances)
-        raise UsageError(f"no instance '{name}'", where=scene.name, remedy=f"there are: {names}")
-    normal = np.asarray(normal_ws, np.float64)
-    corners = instance.positions_ws()[instance.mesh.triangles]
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing = area @ normal > 0.9999 * np.linalg.norm(area, axis=1)
-    facing &= np.linalg.norm(area, axis=1) > 0.0
-    if not facing.any():
-        raise UsageError(f"instance '{name}' has no face along {normal_ws}", where=scene.name, remedy="name another")
-    height = corners[:, 0] @ normal
-    outer = facing & (height > height[facing].max() - 1e-6 * max(1.0, abs(float(height[facing].max()))))
-    u_axis = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else np.array([0.0, 0.0, 1.0])
-    v_axis = np.array([0.0, 0.0, 1.0]) if abs(normal[1]) > 0.9 else np.array([0.0, 1.0, 0.0])
-    points = corners[outer].reshape(-1, 3)
-    u, v = points @ u_axis, points @ v_axis
-    corner = u_axis * u.min() + v_axis * v.min() + normal * height[outer].mean()
-    return PlaneGrid(
-        _three(corner), _three(u_axis * np.ptp(u)), _three(v_axis * np.ptp(v)), _three(normal), size[0], size[1]
-    )
-
-
-def camera_rays(camera: Camera, size: tuple[int, int], samples: int = 1) -> tuple[FloatArray, FloatArray]:
-    """Origins and unit directions (H * samples, W * samples, 3) through even points of every pixel; row 0 on top."""
-    width, height = size[0] * samples, size[1] * samples
-    x = (2.0 * (np.arange(width) + 0.5) / width - 1.0) * size[0] / size[1]
-    y = 1.0 - 2.0 * (np.arange(height) + 0.5) / height
-    x, y = np.meshgrid(x, y)
-    pose = camera.world_from_camera.astype(np.float64)
-    rotation, eye = pose[:3, :3], pose[:3, 3]
-    if camera.orthographic:
-        offset = np.stack([x * camera.ymag_m, y * camera.ymag_m, np.zeros_like(x)], axis=-1)
-        return eye + offset @ rotation.T, np.broadcast_to(-rotation[:, 2], (*x.shape, 3)).copy()
-    tangent = np.tan(0.5 * camera.yfov_rad)
-    local = np.stack([x * tangent, y * tangent, -np.ones_like(x)], axis=-1)
-    local /= np.linalg.norm(local, axis=-1, keepdims=True)
-    return np.broadcast_to(eye, local.shape).copy(), np.asarray(local @ rotation.T)
 
 
 def opaque_caster(instances: Iterable[Instance]) -> RayCaster:

@@ -64,11 +64,6 @@ class CausticsMethod(ABC):
         return None
 
     @classmethod
-    def applies(cls, scene: Scene) -> bool:
-        """Whether the scene needs the method at all."""
-        return cls.why_not(scene) is None
-
-    @classmethod
     @abstractmethod
     def validate(cls, options: Mapping[str, Any]) -> None:
         """Raise UsageError for an option out of its range."""

@@ -127,10 +127,6 @@ class Program:
         """GL name of each texture that the program samples -> name of its sampler."""
         return {t.glo: name for name, textures in self._textures.items() for t in textures}
 
-    def forget_textures(self) -> None:
-        """Drop the references to textures, so that released ones can go."""
-        self._textures.clear()
-
     def release(self) -> None:
         """Give the driver's object back."""
         self._textures.clear()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from glcaustics.errors import GraphError
@@ -69,15 +69,6 @@ class Plan:
     bytes_allocated: int
     bytes_without_aliasing: int
     bytes_without_culling: int
-
-    @property
-    def fingerprint(self) -> Hashable:
-        """Equal for two plans iff they run the same passes on the same resources, so that allocations can be kept."""
-        steps = tuple(
-            (s.name, s.readable, s.decl.history, tuple((r, s.decl.writes[r], self.slots[r]) for r in s.live_writes))
-            for s in self.steps
-        )
-        return (steps, self.outputs, tuple(self.history_slots.items()), self.slot_descs)
 
     def desc(self, resource: str) -> TextureDesc:
         """Texture of a live resource. Raises GraphError when the plan does not have it."""

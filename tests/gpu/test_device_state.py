@@ -127,7 +127,6 @@ def render(device: Device, target: moderngl.Framebuffer) -> np.ndarray:
     device.draw_fullscreen(program, own, blend="min", viewport=(0, 0, 4, 4))
     device.draw_fullscreen(program, target)
     image = device.read(color)
-    program.forget_textures()
     for thing in (own, color, depth, source):
         thing.release()
     return image

@@ -277,14 +277,6 @@ def test_dot_is_balanced_quoted_and_complete() -> None:
         assert line.replace("\\\\", "").replace('\\"', "").count('"') % 2 == 0, line
 
 
-def test_fingerprints_are_equal_iff_passes_and_resources_are() -> None:
-    assert small_frame().fingerprint == small_frame().fingerprint
-    assert hash(small_frame().fingerprint) == hash(small_frame().fingerprint)
-    assert small_frame().fingerprint != small_frame(history=("lit",)).fingerprint
-    other_size = compiled(decl("sky", {"out": TextureDesc("rgba16f", (65, 32))}))
-    assert other_size.fingerprint != compiled(decl("sky", "out")).fingerprint
-
-
 def test_graph_needs_no_opengl() -> None:
     code = (
         "import sys, glcaustics.graph; print([m for m in sys.modules if m.split('.')[0] in ('moderngl', 'glcontext')])"

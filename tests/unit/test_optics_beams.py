@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from glcaustics.bench.scene_export import beam_scene, camera_rays, receiver_plane, renderer_events
+from glcaustics.bench.scene_export import beam_scene, renderer_events
 from glcaustics.errors import UsageError
 from glcaustics.metrics import relative_rmse
 from glcaustics.optics.area_raster import AreaRaster
@@ -269,22 +269,6 @@ def test_eye_rays_refract_to_the_floor() -> None:
     np.testing.assert_allclose(hits.point_ws[1], [0.75 + sine / math.sqrt(1 - sine**2), -1, 0], atol=1e-9)
     assert hits.throughput[2].tolist() == [1, 1, 1]
     assert hits.throughput[0, 0] == pytest.approx(1 - (0.333 / 2.333) ** 2)
-
-
-def test_camera_rays_look_where_the_camera_looks() -> None:
-    camera = load_scene("glass-sphere").camera
-    origin, direction = camera_rays(camera, (9, 5))
-    np.testing.assert_allclose(direction[2, 4], -camera.world_from_camera[:3, 2], atol=1e-12)
-    assert origin.shape == (5, 9, 3)
-    assert direction[0, 4, 1] > direction[4, 4, 1]
-
-
-def test_scene_export_names_its_planes() -> None:
-    scene = load_scene("peer-pool")
-    grid = receiver_plane(scene, "floor", (8, 4))
-    assert grid.corner_ws == pytest.approx((-2, -1, -2)) and grid.side_u_ws == pytest.approx((4, 0, 0))
-    with pytest.raises(UsageError, match="no instance 'wall'"):
-        receiver_plane(scene, "wall", (8, 8))
 
 
 def test_a_scene_without_specular_surfaces_is_refused() -> None:
