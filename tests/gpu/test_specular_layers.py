@@ -9,12 +9,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from glcaustics.errors import UsageError
 from glcaustics.optics.fresnel import transmittance_dielectric
 from glcaustics.renderer import Frame, plan_frame
 from glcaustics.scene.model import Camera, Instance, Material, Scene, Sky
 from glcaustics.scene.transform import scaled
 from tests.gpu.feature_scenes import GLASS, MIRROR, WATER, box, plane, scene_of, sheet, shoot, sun, translation
-from tests.gpu.physics_meshes import icosphere
+from tests.gpu.physics_meshes import height_sheet, icosphere
 
 pytestmark = pytest.mark.gpu
 FloatArray = npt.NDArray[np.float64]
@@ -287,6 +288,39 @@ def test_scale_does_not_matter() -> None:
     small, mid, large = (look(slab_under_water(scale)).image for scale in (1e-3, 1.0, 1e3))
     for image in (small, large):
         np.testing.assert_allclose(image, mid, rtol=1e-3)
+
+
+def test_caustics_are_those_of_the_surface_behind_both() -> None:
+    """AOV caustic_irradiance through waves and a slab: E_c of the floor where the ray ends there."""
+    waves = height_sheet("sea", 4.0, 128, 4, lambda x: 0.06 * np.sin(3.0 * x), lambda x: 0.18 * np.cos(3.0 * x))
+    sea = Instance("sea", waves, WATER)
+    slab = box("slab", (9.0, 0.2, 9.0), (0.0, -0.6, 0.0), GLASS)
+    camera = Camera.look_at((0.0, 2.0, 1.0), (0.0, -1.0, 0.0), yfov_rad=0.7)
+    scene = scene_of([plane("floor", 4.0, -1.2), sea, slab], [sun(10.0, 100.0)], camera)
+    frame = shoot(scene, SIZE, specular_view=True, aovs=("caustic_irradiance", "solve_hit", "solve_status"))
+    floor = shoot(scene, SIZE, specular_view=False, aovs=("caustic_irradiance",)).aov["caustic_irradiance"][..., 1]
+    px = frame.aov["solve_hit"][..., :2] * SIZE
+    inside = np.isin(frame.aov["solve_status"], (1, 5)) & ((px > 2.0) & (px < np.array(SIZE) - 2.0)).all(axis=2)
+    column, row = px[inside].T.astype(int)
+    there, seen = floor[SIZE[1] - 1 - row, column], frame.aov["caustic_irradiance"][..., 1][inside]
+    assert inside.mean() > 0.6 and there.std() > 0.1 * there.mean()
+    assert np.median(np.abs(seen - there)) < 0.02 * there.mean()
+    assert np.corrcoef(seen, there)[0, 1] > 0.98
+
+
+def test_left_out_where_nothing_can_be_behind() -> None:
+    """The plan's words; an object out of the picture changes no bit; a third layer is refused."""
+    mirrors = [box(name, (1.0, 1.0, 0.1), (0.0, 0.5, z), MIRROR) for name, z in (("a", 0.0), ("b", -1.0))]
+    plan = plan_frame(
+        scene_of([plane("floor", 8.0), *mirrors], [sun()], Camera.look_at((0.0, 1.0, 3.0), (0.0, 0.0, 0.0)))
+    )
+    assert {left.name: left.because for left in plan.left_out}["gbuffer.specular2"] == "nothing is seen through mirrors"
+    scene = ball_in_pool(box("aside", (1.0, 1.0, 1.0), (0.0, -0.8, 7.0), GLASS))
+    why = {left.name: left.because for left in plan_frame(scene, options={"specular_layers": 1}).left_out}
+    assert why["gbuffer.specular2"].startswith("one specular layer is asked for")
+    np.testing.assert_array_equal(look(scene).image, look(scene, specular_layers=1).image)
+    with pytest.raises(UsageError, match=r"option specular_layers is 3.*from 1 to 2"):
+        plan_frame(scene, options={"specular_layers": 3})
 
 
 def test_one_object_costs_nothing() -> None:
