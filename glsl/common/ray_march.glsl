@@ -29,8 +29,9 @@ bool glc_march_settle(sampler2D t_plane, GlcRasterRay ray, float reach, inout Gl
 }
 
 // One step a pixel of the longer axis. t_depth: r32f depth in metres, 0 = nothing. in_view: the ray was in front of all surfaces up to
-// its end: whoever looks sees all of it, so that nothing else can be in its way.
-GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, GlcRasterRay ray, int max_steps, out bool in_view) {
+// its end: whoever looks sees all of it, so that nothing else can be in its way. u_clear: up to where that is so.
+GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, GlcRasterRay ray, int max_steps, out bool in_view,
+                       out float u_clear) {
     GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_NOTHING, 0);
     float pixels = max(max(abs(ray.step.x), abs(ray.step.y)) * ray.u_screen, 1.0);
     float du = ray.u_screen / pixels;
@@ -38,6 +39,7 @@ GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, 
     int count = min(int(ceil(pixels)), max_steps);
     bool front = true;
     in_view = true;
+    u_clear = 0.0;
     vec3 p = ray.start;
     int i = 0;
     for (int candidate = 0; candidate < 256 && i <= count; ++candidate) {
@@ -52,6 +54,7 @@ GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, 
             if (was_front && !front) break;
         }
         solve.iterations = i;
+        if (in_view) u_clear = solve.u_front;
         if (i > count) break;
         if (glc_march_settle(t_plane, ray, 2.5 * du, solve)) return solve;
         in_view = false;
@@ -62,7 +65,12 @@ GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, 
     return solve;
 }
 
-// The same, where nobody asks whether the ray stayed in view.
+// The same, where nobody asks how far it is clear.
+GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, GlcRasterRay ray, int max_steps, out bool in_view) {
+    float u_clear;
+    return glc_march_dda(t_depth, t_plane, orthographic, ray, max_steps, in_view, u_clear);
+}
+
 GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, GlcRasterRay ray, int max_steps) {
     bool in_view;
     return glc_march_dda(t_depth, t_plane, orthographic, ray, max_steps, in_view);
@@ -79,9 +87,14 @@ ivec2 glc_bounds_texel(vec2 index, float cell, vec2 size) {
 // glc_bounds_texel): whole cells that the ray is in front of, or stays behind, are skipped, so it finds what the pixel-exact march
 // finds. Where that finds nothing, it takes the first texel whose plane the ray crosses although no centre's depth told (blades seen
 // edge-on). Two loops take turns, since a software renderer runs all of a loop's body for every pixel: over cells, one fetch a step,
-// and over the texels of the one cell that could not be skipped.
-GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRasterRay ray, int max_steps, out bool in_view) {
+// and over the texels of the one cell that could not be skipped, GLC_MARCH_STAY of them at least: the fewer turns, the less rays side
+// by side wait for one another.
+const float GLC_MARCH_STAY = 6.0;
+
+GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRasterRay ray, int max_steps, out bool in_view,
+                                out float u_clear) {
     in_view = true;
+    u_clear = 0.0;
     GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_DIVERGED, 0);
     vec3 crossed = vec3(-1.0);   // u and texel
     vec2 size = vec2(textureSize(t_plane, 0));
@@ -123,6 +136,7 @@ GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRaster
         // To the sample, not the cell: what lies behind a rim is continued from there.
         if (front) solve.u_front = clamp((at - 1.0) * du, 0.0, ray.u_screen);
         bool again = false;
+        float stay = max(leave, at + GLC_MARCH_STAY);
         for (; i < max_steps && !ended; ++i) {
             float u = again ? solve.u : min(at * du, ray.u_screen);
             vec3 p = ray.start + u * ray.step;
@@ -145,14 +159,16 @@ GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRaster
             again = close && !hit && !again;
             // In a cell that is one plane, on to where that is met.
             bool flat_cell = range < 5.0 * (abs(plane.x) + abs(plane.y));
-            float next = over && meets && flat_cell ? clamp(ceil(met / du), at + 1.0, leave) : at + 1.0;
+            float next = over && meets && flat_cell ? clamp(ceil(met / du), at + 1.0, max(at + 1.0, leave)) : at + 1.0;
             at = again ? at : next;
             ended = at > count;
+            u_clear = in_view ? solve.u_front : u_clear;
             in_view = in_view && (front || again || hit);
-            if (hit || (!again && (at >= leave || ended))) break;
+            if (hit || (!again && (at >= stay || ended))) break;
         }
         if (hit) break;
     }
+    if (in_view) u_clear = solve.u_front;
     if (hit) return solve;
     if (crossed.x >= 0.0) return GlcSolve(crossed.x, crossed.x, crossed.yz, 0.0, GLC_SOLVE_HIT, i);
     solve.u = ray.u_screen;
@@ -162,7 +178,12 @@ GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRaster
     return solve;
 }
 
-// The same, where nobody asks whether the ray stayed in view.
+// The same, where nobody asks how far it is clear.
+GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRasterRay ray, int max_steps, out bool in_view) {
+    float u_clear;
+    return glc_march_hierarchical(t_bounds, t_plane, ray, max_steps, in_view, u_clear);
+}
+
 GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRasterRay ray, int max_steps) {
     bool in_view;
     return glc_march_hierarchical(t_bounds, t_plane, ray, max_steps, in_view);

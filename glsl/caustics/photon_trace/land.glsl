@@ -103,18 +103,22 @@ vec2 photon_clip(mat4 raster_from_world, vec2 size, bool orthographic, vec3 o, v
 }
 
 // Marches from t0 on in the camera's view. True where the eye sees all of the ray from o to where that ends: what it found is certain.
-bool photon_march(vec3 o, vec3 d, float t0, float t1, inout PhotonLanding landing) {
+// clear: up to where it sees all of it, metres along the ray.
+bool photon_march(vec3 o, vec3 d, float t0, float t1, inout PhotonLanding landing, out float clear) {
     bool orthographic = u_camera_lens.z != 0.0, in_view;
+    float u_clear;
+    clear = 0.0;
     vec2 part = photon_clip(u_raster_from_world, u_raster_size, orthographic, o, d, t0, t1);
     landing.status = PHOTON_OUTSIDE;
     if (part.y <= part.x) return false;
     GlcRasterRay ray = glc_raster_ray(u_raster_from_world, u_raster_size, o + part.x * d, d, part.y - part.x);
 #if DDA
-    GlcSolve solve = glc_march_dda(t_depth_m, t_plane, orthographic, ray, u_view_steps, in_view);
+    GlcSolve solve = glc_march_dda(t_depth_m, t_plane, orthographic, ray, u_view_steps, in_view, u_clear);
 #else
-    GlcSolve solve = glc_march_hierarchical(t_bounds, t_plane, ray, u_view_steps, in_view);
+    GlcSolve solve = glc_march_hierarchical(t_bounds, t_plane, ray, u_view_steps, in_view, u_clear);
 #endif
     landing.lookups += solve.iterations;
+    if (part.x <= 0.0) clear = glc_raster_distance(ray, u_clear);
     if (solve.status == GLC_SOLVE_HIT) {
         landing.t = part.x + glc_raster_distance(ray, solve.u);
         // The march takes the first texel whose plane the ray crosses within half a pixel of it, which depends on the cells it skipped:
@@ -131,6 +135,9 @@ bool photon_march(vec3 o, vec3 d, float t0, float t1, inout PhotonLanding landin
         landing.per_m2 = photon_per_m2(texel, stored.w, photon_plane(stored).xyz);
         landing.status = PHOTON_BY_EYE_VIEW;
         return in_view && part.x <= 0.0;
+    } else if (in_view && clear >= 0.9999 * t1) {
+        landing.status = PHOTON_LEFT;
+        return true;
     } else if (solve.status == GLC_SOLVE_HIDDEN) {
         landing.status = PHOTON_UNSEEN;
     } else if (solve.status == GLC_SOLVE_DIVERGED) {
@@ -167,7 +174,8 @@ PhotonLanding photon_land(vec3 o, vec3 d, GlcHit hit, float slack_m, float t_max
     PhotonLanding landing = PhotonLanding(vec2(0.0), 0.0, hit.t, 0, 0, vec4(0.0), 0.0);
     bool found = hit.status > 0;
     if (found && photon_refine(o, d, hit, slack_m, landing)) return landing;
-    photon_march(o, d, found ? max(hit.t - 4.0 * slack_m, 0.0) : 0.0, t_max, landing);
+    float clear;
+    photon_march(o, d, found ? max(hit.t - 4.0 * slack_m, 0.0) : 0.0, t_max, landing, clear);
     if (landing.status <= 0 && !found) photon_give_up(hit, landing);
     return landing;
 }

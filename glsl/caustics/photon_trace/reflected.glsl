@@ -22,7 +22,7 @@ mat4 photon_face_raster(GlcView view, vec2 face_size, vec3 p) {
 }
 
 // Where the ray meets what the light sees, by a march over depth bounds: no surface is stepped over, however thin.
-GlcHit photon_march_light(GlcView view, vec3 o, vec3 d, float t_max) {
+GlcHit photon_march_light(GlcView view, vec3 o, vec3 d, float t, float t_max) {
     GlcHit hit = GlcHit(0.0, o, -d, 0, GLC_LEFT);
 #if RECEIVER_FACES == 1
     vec2 face_size = view.size;
@@ -31,7 +31,6 @@ GlcHit photon_march_light(GlcView view, vec3 o, vec3 d, float t_max) {
     vec2 face_size = view.size / vec2(3.0, 2.0);
     const bool orthographic = false;
 #endif
-    float t = 0.0;
     // A straight line crosses the faces of a cube at most four times.
     for (int piece = 0; piece < (RECEIVER_FACES == 1 ? 1 : 5) && t < t_max && hit.status <= 0; ++piece) {
         vec3 inside = o + (RECEIVER_FACES == 1 ? 0.0 : t + 1e-4 * t_max) * d;
@@ -63,10 +62,11 @@ GlcHit photon_march_light(GlcView view, vec3 o, vec3 d, float t_max) {
 
 PhotonLanding photon_land_reflected(vec3 o, vec3 d, float t_max) {
     PhotonLanding landing = PhotonLanding(vec2(0.0), 0.0, 0.0, 0, 0, vec4(0.0), 0.0);
-    if (photon_march(o, d, 0.0, t_max, landing)) return landing;
+    float clear;
+    if (photon_march(o, d, 0.0, t_max, landing, clear)) return landing;
     PhotonLanding eye = landing;
     GlcView view = glc_receiver_view();
-    GlcHit hit = photon_march_light(view, o, d, t_max);
+    GlcHit hit = photon_march_light(view, o, d, clear, eye.status > 0 ? eye.t : t_max);
     bool found = hit.status > 0;
     landing.lookups += hit.iterations;
     eye.lookups = landing.lookups;

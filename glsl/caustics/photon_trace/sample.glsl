@@ -49,31 +49,32 @@ struct PhotonStart {
 
 // Bilinear between texel centres where the four texels hold one smooth piece of one object, else the nearest texel.
 PhotonStart photon_start(vec2 at) {
-    ivec2 nearest = ivec2(at);
-    vec4 position = texelFetch(t_caster_position, nearest, 0);
-    vec4 normal = texelFetch(t_caster_normal, nearest, 0);
-    PhotonStart start = PhotonStart(position.xyz, normal.xyz, normal.w, int(position.w + 0.5) - 1);
-    if (start.object < 0) return start;
-    float width = glc_texel_width(glc_caster_view(), position.xyz);
-    ivec2 lower = ivec2(0), upper = ivec2(u_caster_size) - 1;
-#if CASTER_FACES == 6
-    ivec2 tile = ivec2(u_caster_size) / ivec2(3, 2);
-    lower = nearest / tile * tile;
-    upper = lower + tile - 1;
-#endif
     vec2 base = floor(at - 0.5), f = at - 0.5 - base;
+    vec2 lower = vec2(0.0), upper = u_caster_size - 1.0;
+#if CASTER_FACES == 6
+    vec2 tile = u_caster_size / vec2(3.0, 2.0);
+    lower = floor(at / tile) * tile;
+    upper = lower + tile - 1.0;
+#endif
+    bool smooth_piece = all(greaterThanEqual(base, lower)) && all(lessThan(base, upper));
+    vec4 q[4], m[4];
+    for (int i = 0; i < 4; ++i) {
+        ivec2 texel = ivec2(clamp(base + vec2(i & 1, i >> 1), lower, upper));
+        q[i] = texelFetch(t_caster_position, texel, 0);
+        m[i] = texelFetch(t_caster_normal, texel, 0);
+    }
+    bvec2 right = greaterThanEqual(f, vec2(0.5));
+    vec4 position = right.y ? (right.x ? q[3] : q[2]) : (right.x ? q[1] : q[0]);
+    vec4 normal = right.y ? (right.x ? m[3] : m[2]) : (right.x ? m[1] : m[0]);
+    float reach = 2.0 * glc_texel_width(glc_caster_view(), position.xyz);
     vec4 weights = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
     vec3 p = vec3(0.0), n = vec3(0.0);
     for (int i = 0; i < 4; ++i) {
-        ivec2 texel = ivec2(base) + ivec2(i & 1, i >> 1);
-        if (any(lessThan(texel, lower)) || any(greaterThan(texel, upper))) return start;
-        vec4 q = texelFetch(t_caster_position, texel, 0), m = texelFetch(t_caster_normal, texel, 0);
-        bool same = q.w == position.w && m.w * normal.w > 0.0 && abs(dot(q.xyz - position.xyz, normal.xyz)) < 2.0 * width;
-        if (!same) return start;
-        p += weights[i] * q.xyz;
-        n += weights[i] * m.xyz;
+        bool same = q[i].w == position.w && m[i].w * normal.w > 0.0 && abs(dot(q[i].xyz - position.xyz, normal.xyz)) < reach;
+        smooth_piece = smooth_piece && same;
+        p += weights[i] * q[i].xyz;
+        n += weights[i] * m[i].xyz;
     }
-    start.position_ws = p;
-    start.normal_ws = glc_safe_normalize(n, normal.xyz);
-    return start;
+    if (!smooth_piece) { p = position.xyz; n = normal.xyz; }
+    return PhotonStart(p, smooth_piece ? glc_safe_normalize(n, normal.xyz) : n, normal.w, int(position.w + 0.5) - 1);
 }
