@@ -13,7 +13,7 @@ from glcaustics.gpu import Device
 from glcaustics.renderer import Renderer
 from glcaustics.scene.model import Camera, Scene
 
-_PARTS = ("depth_chain.4", "depth_chain.levels", "refraction")
+_PARTS = ("depth_chain.4", "depth_chain.levels", "depth_chain.near", "refraction")
 _STAGES = ("opaque", "first", "mask", "finish")
 
 

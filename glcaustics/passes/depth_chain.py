@@ -14,11 +14,23 @@ def _cells(size: tuple[int, int], texels: int) -> tuple[int, int]:
 
 
 def declare(graph: FrameGraph, setup: FrameSetup, layer: str = "") -> None:
-    """Two passes: the finest level, then all levels in one texture, `depth_chain<layer>.bounds` (`glc_bounds_texel`).
+    """The finest level, all levels in one texture, `depth_chain<layer>.bounds` (`glc_bounds_texel`), and of the first
+    layer what is nearest around each cell of 16 x 16, `depth_chain.near` (`glc_way_above`).
 
-    `layer`: suffix of an opaque layer of the G-buffer. Culled where no pass marches over it.
+    `layer`: suffix of an opaque layer of the G-buffer. Culled where nothing reads it.
     """
-    declare_over(graph, f"depth_chain{layer}", f"gbuffer{layer}.plane", setup.size)
+    chain = f"depth_chain{layer}"
+    declare_over(graph, chain, f"gbuffer{layer}.plane", setup.size)
+    if not layer:
+        graph.add(
+            PassDecl(
+                "depth_chain.near",
+                {"depth_chain.near": TextureDesc("rgba32f", _cells(setup.size, 16), "1/m")},
+                partial(_execute_near, setup.size),
+                reads=("depth_chain.bounds",),
+                note="nearest depth in squares around 16 x 16 texels",
+            )
+        )
 
 
 def declare_over(graph: FrameGraph, chain: str, planes: str, size: tuple[int, int], suffix: str = "") -> None:
@@ -58,3 +70,9 @@ def _execute_levels(finest: str, levels: str, size: tuple[int, int], ctx: PassCo
         program = ctx.device.program("passes/depth_chain/levels", {"STEP": texels // 4})
         program.set(t_bounds_4=ctx.texture(finest), u_origin=origin)
         ctx.device.draw_fullscreen(program, ctx.target(levels), viewport=(*origin, *_cells(size, texels)))
+
+
+def _execute_near(size: tuple[int, int], ctx: PassContext) -> None:
+    program = ctx.device.program("passes/depth_chain/near")
+    program.set(t_bounds=ctx.texture("depth_chain.bounds"), u_origin=(_cells(size, 4)[0], 0), u_cells=_cells(size, 16))
+    ctx.device.draw_fullscreen(program, ctx.target("depth_chain.near"))

@@ -25,7 +25,7 @@ SOLVERS: dict[str, str] = {
     "sousa": "the straight pixel, moved (Sousa 2005)",
 }
 SECOND_CHAIN = ("depth_chain2.bounds",)
-PLANES, CHAIN = ("gbuffer.plane",), ("depth_chain.bounds",)
+PLANES, CHAIN, NEAR = ("gbuffer.plane",), ("depth_chain.bounds",), ("depth_chain.near",)
 SECOND_LAYER = ("shade2.radiance", "gbuffer2.plane", "shade2.caustic_irradiance")
 SOLID_LAYERS = ("specular.plane", "specular.back_plane", "specular.back_normal_ws")
 _MARCH = {"cascade": 2, "newton": 0, "dda": 1, "hierarchical": 2, "sousa": 0}
@@ -79,6 +79,7 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
                 *("shade.radiance", "gbuffer.depth_m", "specular.depth", "specular.depth_m", "specular.normal_ws"),
                 *(PLANES if solver != "sousa" or layers else ()),
                 *(CHAIN if _MARCH[solver] == 2 or layers else ()),
+                *(NEAR if cascade else ()),
                 *dict.fromkeys((*(SOLID_LAYERS if solids else ()), *layers)),
             ),
             optional=("caustics.irradiance", *second),
@@ -148,7 +149,7 @@ def _finish(ctx: PassContext) -> None:
             program.set(t_last_reflection_m=ctx.history(REFLECTION_M))
             program.set(u_last_raster_from_world=raster_from_world(before, ctx.setup.size))
         target = ctx.target(*written.values(), depth=TODO_DEPTH)
-        device.draw_fullscreen(program.set(u_mask_depth=0.5 / 255.0), target, depth_func="<=", blend="add")
+        device.draw_fullscreen(program.set(u_mask_depth=0.25), target, depth_func="<=", blend="add")
 
 
 def _seeds(setup: FrameSetup) -> bool:
@@ -229,6 +230,7 @@ def _textures(ctx: PassContext) -> dict[str, Any]:
         "t_specular_normal": "specular.normal_ws",
         "t_plane": "gbuffer.plane",
         "t_bounds": "depth_chain.bounds",
+        "t_near": "depth_chain.near",
         "t_front_plane": "specular.plane",
         "t_back_plane": "specular.back_plane",
         "t_back_normal": "specular.back_normal_ws",

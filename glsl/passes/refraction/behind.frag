@@ -91,7 +91,7 @@ void leave_reflection(Surface at, Rays rays) {
     Seen none = Seen(vec3(0.0), vec3(0.0), 0.0, vec2(0.0), 0.0, 0.0, GLC_VIEW_OPAQUE), seen = none;
 #if USE_MARCH
     rays.refracts = false;
-    look_everywhere(at, rays, 0.0, seen, reflection, reflection_m);
+    look_everywhere(at, rays, seen, reflection, reflection_m);
 #elif !FINAL
     if (rays.reflects) {
         reflection = vec3(0.0);

@@ -21,10 +21,10 @@ layout(location = LOCATION_BEHIND) out float o_behind;           // 1: a second 
 layout(location = LOCATION_SOLVE) out vec4 o_solve;              // uv of the hit, error in pixels, texel look-ups
 #endif
 
-// What the cascade's last stage must finish, also the mask's depth (todo.frag): 0 nothing, 1/255 the reflection, k/255 from 2 on all, the
-// march beginning k - 2 steps of the way behind the refracted ray's start, so far the way is clear.
+// What the cascade's last stage must finish: also the mask's depth (todo.frag).
 #define GLC_TODO_NOTHING 0.0
-#define GLC_TODO_REFLECTION (1.0 / 255.0)
+#define GLC_TODO_REFLECTION 0.5
+#define GLC_TODO_ALL 1.0
 
 // The way each pixel went; renderer.AOVS documents the same numbers.
 #define GLC_VIEW_OPAQUE 0.0

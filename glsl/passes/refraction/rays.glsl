@@ -11,6 +11,10 @@
 // Shares of the reflection below which the sky stands for what a march would find, faded in between.
 const float REFLECT_FROM = 0.07, REFLECT_TO = 0.16;
 
+#if FINISH
+uniform sampler2D t_todo;
+#endif
+
 // A ray from the surface.
 GlcRasterRay surface_ray(Surface at, vec3 d, float room_m) {
 #if CONTINUED
@@ -91,7 +95,7 @@ Rays rays_of(Surface at) {
     rays.mirror_d = reflect(at.v, at.n);
     rays.refracts = glc_refract(at.v, at.n, at.eta, rays.d) && !at.mirror;
 #if FINISH
-    rays.refracts = rays.refracts && texelFetch(t_todo, ivec2(gl_FragCoord.xy), 0).r > 1.5 * GLC_TODO_REFLECTION;
+    rays.refracts = rays.refracts && texelFetch(t_todo, ivec2(gl_FragCoord.xy), 0).r > 0.5 * (GLC_TODO_REFLECTION + GLC_TODO_ALL);
 #endif
     rays.leaves = true;
     rays.under = 0.0;
@@ -115,7 +119,7 @@ vec3 mirrored(Surface at, Rays rays, Seen seen) {
 #if USE_MARCH
 // The refracted ray, the mirrored one, or both in turn: one loop, so that pixels with one of either kind march together. A mirror
 // shows the mirrored one. reflection_m: to where that was solved; 0: it was not.
-void look_everywhere(Surface at, Rays rays, float from, inout Seen seen, inout vec3 reflection, out float reflection_m) {
+void look_everywhere(Surface at, Rays rays, inout Seen seen, inout vec3 reflection, out float reflection_m) {
     GlcRasterRay mirror_ray = surface_ray(at, rays.mirror_d, glc_box_exit(at.p, rays.mirror_d, u_bounds_min_ws, u_bounds_max_ws));
     GlcRasterRay ray = mirror_ray;
     vec3 mirror_d = rays.mirror_d;
@@ -126,7 +130,7 @@ void look_everywhere(Surface at, Rays rays, float from, inout Seen seen, inout v
     Upward upward = Upward(false, false, 0.0, 1.0);
 #endif
     for (;;) {
-        Seen found = look_along(ray, at.p, refracted ? rays.d : mirror_d, refracted ? from : 0.0, !refracted);
+        Seen found = look_along(ray, at.p, refracted ? rays.d : mirror_d, !refracted);
 #if CONTINUED
         if (!refracted && comes_up(at, found, upward, ray, mirror_d)) continue;
 #endif

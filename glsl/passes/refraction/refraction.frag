@@ -32,22 +32,19 @@ void main() {
     vec3 reflection = rays.weight * glc_sky_radiance(rays.mirror_d);
     float todo = GLC_TODO_NOTHING, reflection_m = 0.0;
 #if USE_MARCH
-    float from = 0.0;
 #if FINISH
-    if (rays.refracts) from = clear_u(texelFetch(t_todo, ivec2(gl_FragCoord.xy), 0).r, rays.ray);
-    else seen = NOTHING;   // is there already
+    if (!rays.refracts) seen = NOTHING;   // is there already
 #endif
-    look_everywhere(at, rays, from, seen, reflection, reflection_m);
+    look_everywhere(at, rays, seen, reflection, reflection_m);
     if (rays.refracts && !rays.leaves) seen.status = GLC_VIEW_TIR;
 #else
-    float clear_px = 0.0;
     bool solved = true;
-    if (rays.refracts) seen = look_through(rays.ray, rays.p, rays.d, solved, clear_px);
+    if (rays.refracts) seen = look_through(rays.ray, rays.p, rays.d, solved);
     if (rays.refracts && !rays.leaves) seen.status = GLC_VIEW_TIR;
 #if !FINAL
     if (!solved || at.mirror) seen = NOTHING;
     if (!solved || rays.reflects) reflection = vec3(0.0);
-    todo = solved ? (rays.reflects ? GLC_TODO_REFLECTION : GLC_TODO_NOTHING) : todo_from(clear_px);
+    todo = solved ? (rays.reflects ? GLC_TODO_REFLECTION : GLC_TODO_NOTHING) : GLC_TODO_ALL;
 #endif
 #endif
 #if HAS_BEHIND

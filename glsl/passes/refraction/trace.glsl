@@ -15,6 +15,9 @@ uniform sampler2D t_plane;
 #if USE_MARCH == 2 || !FINAL
 uniform sampler2D t_bounds;
 #endif
+#if SEEDED || !FINAL
+uniform sampler2D t_near;
+#endif
 #if HAS_CAUSTICS_VIEW
 uniform sampler2D t_caustics;
 #endif
@@ -28,10 +31,6 @@ uniform float u_bounds_diagonal_m;
 uniform int u_refraction_iterations;
 uniform int u_refraction_steps;
 uniform int u_reflection_steps;
-
-#if FINISH
-uniform sampler2D t_todo;
-#endif
 
 // Points of a ray at which the cascade looks for what may stand before it.
 // With 6, thin blades at a grazing angle cost the cascade 1.1 % of what the DDA finds; with 12, 0.4 %, for 2 % of the frame.
@@ -141,30 +140,19 @@ GlcRasterRay pixel_ray(float depth_m, vec3 d, float room_m) {
     return glc_raster_ray_from(u_raster_from_world, u_raster_size, start, w, d, room_m);
 }
 
-// Pixels of way a step that the last stage need not march, as `todo` counts them (outputs.glsl): 506 in all at 720 rows.
-float todo_step_px() {
-    return u_raster_size.y / 360.0;
-}
-
-float todo_from(float clear_px) {
-    return (2.0 + clamp(floor(clear_px / todo_step_px()), 0.0, 253.0)) / 255.0;
-}
-
-float clear_u(float todo, GlcRasterRay ray) {
-    float clear_px = max(255.0 * todo - 2.0, 0.0) * todo_step_px();
-    float extent = max(max(abs(ray.step.x), abs(ray.step.y)), 1e-6);
-    return floor(min(clear_px, 0.999 * ray.u_screen * extent)) / extent;   // to the march's samples, one a pixel
-}
-
 #if !USE_MARCH
-// Along a refracted ray. solved: false where the last stage should look again, from clear_px pixels of way on.
-Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved, out float clear_px) {
+// Along a refracted ray. solved: false where the last stage should look again.
+Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved) {
     solved = true;
-    clear_px = 0.0;
 #if USE_SOUSA
     return look_sousa(ray, p, d);
 #else
-    GlcSolve solve = glc_newton_from(t_plane, ray, 1.0, 0.0, RESTARTS == 1, u_refraction_iterations);
+#if FINAL
+    float above = 0.0;
+#else
+    float above = glc_way_above(t_near, u_raster_size, ray);
+#endif
+    GlcSolve solve = glc_newton_from(t_plane, ray, 1.0, above, RESTARTS == 1, u_refraction_iterations);
     bool hit = solve.status == GLC_SOLVE_HIT, mixes;
     float status = GLC_VIEW_NEWTON;
 #if HAS_SECOND
@@ -178,10 +166,7 @@ Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved, out float c
 #endif
     Seen seen = seen_at(end, d, ray, solve, mixes);
 #if !FINAL
-    float u = hit || solve.status == GLC_SOLVE_OFFSCREEN ? solve.u : 0.0;
-    float clear = glc_way_clear(t_bounds, u_raster_size, ray, u, CLEAR_POINTS);
-    solved = hit && !mixes && clear >= u;
-    clear_px = clear * max(abs(ray.step.x), abs(ray.step.y));
+    solved = hit && !mixes && glc_way_clear(t_bounds, u_raster_size, ray, above, solve.u, CLEAR_POINTS) >= solve.u;
 #endif
     seen.uv = estimate;   // the solver's own, for who judges it
     return seen;
@@ -198,39 +183,24 @@ GlcSolve solve_again(vec3 p, GlcRasterRay ray) {
     float last_m = seen ? texelFetch(t_last_reflection_m, ivec2(was), 0).r : 0.0;
     int iterations = last_m > 0.0 ? REFLECTION_ITERATIONS : 0;
     GlcSolve solve = glc_newton_from(t_plane, ray, 1.0, clamp(glc_raster_at(ray, last_m), 0.0, ray.u_screen), false, iterations);
-    if (glc_way_clear(t_bounds, u_raster_size, ray, solve.u, CLEAR_POINTS) < solve.u) solve.status = GLC_SOLVE_DIVERGED;
+    float above = glc_way_above(t_near, u_raster_size, ray);
+    if (glc_way_clear(t_bounds, u_raster_size, ray, above, solve.u, CLEAR_POINTS) < solve.u) solve.status = GLC_SOLVE_DIVERGED;
     return solve;
 }
 #endif
 
 #if USE_MARCH
-// Marches from u = from on: up to there the way is clear.
-GlcSolve march_from(GlcRasterRay ray, float from, int steps, out bool in_view) {
-#if FINISH
-    GlcRasterRay rest = ray;
-    rest.start += from * ray.step;
-    rest.step *= 1.0 - from;
-    rest.u_screen = clamp((ray.u_screen - from) / (1.0 - from), 0.0, 1.0);
-    GlcSolve solve = MARCH(rest, steps, in_view);
-    solve.u = mix(from, 1.0, solve.u);
-    solve.u_front = mix(from, 1.0, solve.u_front);
-    return solve;
-#else
-    return MARCH(ray, steps, in_view);
-#endif
-}
-
 // Along a refracted or mirrored ray of the surface at p.
-Seen look_along(GlcRasterRay ray, vec3 p, vec3 d, float from, bool mirrored) {
+Seen look_along(GlcRasterRay ray, vec3 p, vec3 d, bool mirrored) {
     int steps = mirrored ? u_reflection_steps : u_refraction_steps;
     float status = GLC_VIEW_MARCHED;
     bool mixes, in_view = true;
 #if SEEDED
     GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_DIVERGED, 0);
     if (mirrored) solve = solve_again(p, ray);
-    if (solve.status != GLC_SOLVE_HIT) solve = march_from(ray, from, steps, in_view);
+    if (solve.status != GLC_SOLVE_HIT) solve = MARCH(ray, steps, in_view);
 #else
-    GlcSolve solve = march_from(ray, from, steps, in_view);
+    GlcSolve solve = MARCH(ray, steps, in_view);
 #endif
 #if HAS_SECOND
     if (!in_view) look_behind(ray, steps, solve, status);
