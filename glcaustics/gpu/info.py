@@ -6,6 +6,7 @@ from typing import Any
 
 import moderngl
 
+from glcaustics.gpu import gl_enums as gl
 from glcaustics.gpu.rawgl import RawGL
 
 _SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "swrast", "software")
@@ -37,18 +38,18 @@ def device_info(ctx: moderngl.Context, raw: RawGL) -> dict[str, Any]:
         "vendor": names["GL_VENDOR"],
         "version": names["GL_VERSION"],
         "version_code": ctx.version_code,
-        "max_texture_size": raw.integer(0x0D33),
-        "max_cube_map_size": raw.integer(0x851C),
-        "max_array_layers": raw.integer(0x88FF),
-        "max_texture_units": raw.integer(0x8872),
-        "max_draw_buffers": raw.integer(0x8824),
-        "max_color_attachments": raw.integer(0x8CDF),
-        "max_viewport": list(raw.integers(0x0D3A, 2)),
-        "point_size_range": list(raw.floats(0x0B12, 2)),
-        "max_vertex_uniform_components": raw.integer(0x8B4A),
-        "max_fragment_uniform_components": raw.integer(0x8B49),
-        "max_uniform_block_bytes": raw.integer(0x8A30),
-        "max_vertex_attributes": raw.integer(0x8869),
-        "max_samples": raw.integer(0x8D57),
+        "max_texture_size": raw.integer(gl.MAX_TEXTURE_SIZE),
+        "max_cube_map_size": raw.integer(gl.MAX_CUBE_MAP_TEXTURE_SIZE),
+        "max_array_layers": raw.integer(gl.MAX_ARRAY_TEXTURE_LAYERS),
+        "max_texture_units": raw.integer(gl.MAX_TEXTURE_IMAGE_UNITS),
+        "max_draw_buffers": raw.integer(gl.MAX_DRAW_BUFFERS),
+        "max_color_attachments": raw.integer(gl.MAX_COLOR_ATTACHMENTS),
+        "max_viewport": list(raw.integers(gl.MAX_VIEWPORT_DIMS, 2)),
+        "point_size_range": list(raw.floats(gl.POINT_SIZE_RANGE, 2)),
+        "max_vertex_uniform_components": raw.integer(gl.MAX_VERTEX_UNIFORM_COMPONENTS),
+        "max_fragment_uniform_components": raw.integer(gl.MAX_FRAGMENT_UNIFORM_COMPONENTS),
+        "max_uniform_block_bytes": raw.integer(gl.MAX_UNIFORM_BLOCK_SIZE),
+        "max_vertex_attributes": raw.integer(gl.MAX_VERTEX_ATTRIBS),
+        "max_samples": raw.integer(gl.MAX_SAMPLES),
         "features": features(ctx),
     }

@@ -10,11 +10,8 @@ import moderngl
 import numpy as np
 
 from glcaustics.errors import DeviceError, ResourceLimitError, UsageError
+from glcaustics.gpu import gl_enums as gl
 from glcaustics.gpu.rawgl import RawGL
-
-_GL_TEXTURE_2D, _GL_TEXTURE0 = 0x0DE1, 0x84C0
-_GL_DEPTH_COMPONENT, _GL_FLOAT, _GL_DEPTH_COMPONENT32F = 0x1902, 0x1406, 0x8CAC
-_GL_SRGB8_ALPHA8 = 0x8C43
 
 
 @dataclass(frozen=True)
@@ -35,7 +32,7 @@ FORMATS: dict[str, Format] = {
     "rg16f": Format(2, "f2", 4),
     "r16f": Format(1, "f2", 2),
     "rgba8": Format(4, "f1", 4),
-    "srgba8": Format(4, "f1", 4, _GL_SRGB8_ALPHA8),
+    "srgba8": Format(4, "f1", 4, gl.SRGB8_ALPHA8),
     "r8": Format(1, "f1", 1),
     "depth24": Format(1, "f4", 4),
     "depth32f": Format(1, "f4", 4),
@@ -61,6 +58,13 @@ class FramebufferInfo:
     label: str
 
 
+#: name -> filter within a level, and across levels of a mip chain
+_FILTERS = {
+    "nearest": (moderngl.NEAREST, moderngl.NEAREST_MIPMAP_NEAREST),
+    "linear": (moderngl.LINEAR, moderngl.LINEAR_MIPMAP_LINEAR),
+}
+
+
 def make_texture(
     ctx: moderngl.Context,
     raw: RawGL,
@@ -77,34 +81,36 @@ def make_texture(
 ) -> moderngl.Texture:
     """See `Device.texture`."""
     name = f"texture '{label}'" if label else "texture"
+    if filter not in _FILTERS:
+        raise UsageError(f"{name}: filter '{filter}' is unknown", remedy=f"use {' or '.join(_FILTERS)}")
+    size = (int(size[0]), int(size[1]))
+    _check_request(name, size, format, compare, max_size)
+    kind = FORMATS[format]
+    payload = None if data is None else _pixels(name, data, size, kind)
+    texture = _allocate(ctx, raw, name, size, format, payload)
+    texture.repeat_x = texture.repeat_y = repeat
+    magnify, minify_mipmap = _FILTERS[filter]
+    texture.filter = (magnify, magnify)
+    if format.startswith("depth"):
+        texture.compare_func = "<=" if compare else ""
+    if mipmaps:
+        texture.build_mipmaps()
+        texture.filter = (minify_mipmap, magnify)
+    texture.extra = TextureInfo(label, format, compare, size[0] * size[1] * kind.bytes_per_texel)
+    _check_allocation(ctx, name, size, format, texture)
+    return texture
+
+
+def _check_request(name: str, size: tuple[int, int], format: str, compare: bool, max_size: int) -> None:
     if format not in FORMATS:
         raise UsageError(f"{name}: format '{format}' is unknown", remedy=f"use one of {', '.join(FORMATS)}")
-    if filter not in ("nearest", "linear"):
-        raise UsageError(f"{name}: filter '{filter}' is unknown", remedy="use nearest or linear")
-    depth = format.startswith("depth")
-    if compare and not depth:
+    if compare and not format.startswith("depth"):
         raise UsageError(f"{name}: depth compare asked of the colour format {format}", remedy="use depth24")
-    size = (int(size[0]), int(size[1]))
     if min(size) < 1 or max(size) > max_size:
         raise ResourceLimitError(
             f"{name}: {size[0]} x {size[1]} texels, allowed are 1 to {max_size} a side",
             remedy="ask for a smaller image or map size" if max(size) > max_size else "give a size of at least 1 x 1",
         )
-    kind = FORMATS[format]
-    payload = None if data is None else _pixels(name, data, size, kind)
-    texture = _allocate(ctx, raw, name, size, format, payload)
-    texture.repeat_x = texture.repeat_y = repeat
-    mode = moderngl.LINEAR if filter == "linear" else moderngl.NEAREST
-    texture.filter = (mode, mode)
-    if depth:
-        texture.compare_func = "<=" if compare else ""
-    if mipmaps:
-        texture.build_mipmaps()
-        minify = moderngl.LINEAR_MIPMAP_LINEAR if filter == "linear" else moderngl.NEAREST_MIPMAP_NEAREST
-        texture.filter = (minify, mode)
-    texture.extra = TextureInfo(label, format, compare, size[0] * size[1] * kind.bytes_per_texel)
-    _check_allocation(ctx, name, size, format, texture)
-    return texture
 
 
 def _pixels(name: str, data: Any, size: tuple[int, int], kind: Format) -> bytes:
@@ -138,11 +144,9 @@ def _allocate(
         if format == "depth32f":
             # moderngl knows 24-bit depth only: take its texture and give it other storage.
             texture = ctx.depth_texture(size)
-            raw.glActiveTexture(_GL_TEXTURE0 + ctx.default_texture_unit)
-            raw.glBindTexture(_GL_TEXTURE_2D, texture.glo)
-            raw.glTexImage2D(
-                _GL_TEXTURE_2D, 0, _GL_DEPTH_COMPONENT32F, *size, 0, _GL_DEPTH_COMPONENT, _GL_FLOAT, payload
-            )
+            raw.glActiveTexture(gl.TEXTURE0 + ctx.default_texture_unit)
+            raw.glBindTexture(gl.TEXTURE_2D, texture.glo)
+            raw.glTexImage2D(gl.TEXTURE_2D, 0, gl.DEPTH_COMPONENT32F, *size, 0, gl.DEPTH_COMPONENT, gl.FLOAT, payload)
             return texture
         return ctx.texture(size, kind.components, payload, dtype=kind.dtype, internal_format=kind.internal_format)
     except moderngl.Error as error:

@@ -10,11 +10,10 @@ from typing import Any
 
 import moderngl
 
+from glcaustics.gpu import gl_enums as gl
 from glcaustics.gpu.rawgl import RawGL
 
 _RING = 4  # frames in flight before a query must be read
-_GL_TIMESTAMP = 0x8E28
-_GL_QUERY_RESULT_AVAILABLE, _GL_QUERY_RESULT = 0x8867, 0x8866
 
 
 class Timers:
@@ -78,7 +77,7 @@ class _TimestampQueries:
     def stamp(self) -> int:
         """Ask for the GPU's time at this point of the command stream."""
         query = self._free.pop() if self._free else self._raw.gen_query()
-        self._raw.glQueryCounter(query, _GL_TIMESTAMP)
+        self._raw.glQueryCounter(query, gl.TIMESTAMP)
         return query
 
     def finish(self, name: str, start: int, end: int) -> None:
@@ -91,9 +90,9 @@ class _TimestampQueries:
         while self._pending:
             name, start, end = self._pending[0]
             late = wait or len(self._pending) > _RING * 64
-            if not late and not self._raw.query_value(end, _GL_QUERY_RESULT_AVAILABLE):
+            if not late and not self._raw.query_value(end, gl.QUERY_RESULT_AVAILABLE):
                 break
-            nanoseconds = self._raw.query_value(end, _GL_QUERY_RESULT) - self._raw.query_value(start, _GL_QUERY_RESULT)
+            nanoseconds = self._raw.query_value(end, gl.QUERY_RESULT) - self._raw.query_value(start, gl.QUERY_RESULT)
             done[name] = nanoseconds * 1e-6
             self._pending.popleft()
             self._free += [start, end]
