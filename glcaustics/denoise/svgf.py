@@ -1,10 +1,10 @@
 """Spatiotemporal variance-guided filtering (Schied et al. 2017) of irradiance at the camera's pixels.
 
 Knows nothing of the method whose noise it takes: see `declare`, and docs/methods/svgf.md. Beyond the paper: histories
-in 32-bit floats, resampled by cubics; mixed with the new frame by what the light's change and the noise make of them
-(after Schied, Peters, Dachsbacher 2018, but without re-shaded samples); a noise estimate that does not take the
-caustic itself for noise; an a-trous filter in conservative form, so that the sum over the picture stays what it was,
-however sparse and bright the samples are.
+in 32-bit floats, resampled by polynomials through 6 x 6 texels; mixed with the new frame by what the light's change and
+the noise make of them (after Schied, Peters, Dachsbacher 2018, but without re-shaded samples); a noise estimate that
+does not take the caustic itself for noise; an a-trous filter in conservative form, so that the sum over the picture
+stays what it was, however sparse and bright the samples are.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ OPTION_HELP: Mapping[str, str] = {
     "denoise_history": "adaptive: shortened where the light changes; exponential: alpha 0.2, bilinear, as in the "
     "paper: a baseline",
 }
+TAPS: Mapping[str, int] = {"adaptive": 6, "exponential": 2}  # texels in a row that a look-up in the history takes
 EXPONENTIAL_FRAMES = 5  # 1 / alpha (Schied et al. 2017, sec. 5)
 
 
@@ -161,8 +162,8 @@ def _reproject(ctx: PassContext) -> None:
         "u_previous_jitter": before.jitter_uv,
         "u_history_shift": shift,
     }
-    cubic = int(ctx.setup.options["denoise_history"] == "adaptive")
-    _draw(ctx, "reproject", (REPROJECTED, REPROJECTED_MOMENTS), values, CUBIC=cubic)
+    taps = TAPS[ctx.setup.options["denoise_history"]]
+    _draw(ctx, "reproject", (REPROJECTED, REPROJECTED_MOMENTS), values, TAPS=taps)
 
 
 def _blocks(ctx: PassContext, noisy: str) -> None:

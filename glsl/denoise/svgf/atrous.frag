@@ -1,7 +1,7 @@
 // One pass of the a-trous filter (Dammertz et al. 2010; variance-guided: Schied et al. 2017, sec. 4.3), in conservative form: neighbours
 // exchange c_q - c_p times a weight that is the same from both sides, so that the sum over the picture stays as it was. Normalised
 // weights would let bright single samples give more than their dark neighbours take. The first pass tells light apart by a smoothed
-// luminance, since single pixels of a sparse estimate look like nothing around them.
+// luminance, since single pixels of a sparse estimate look like nothing around them, unless two pixels differ by more than their noise.
 #include "denoise/svgf/geometry.glsl"
 
 uniform sampler2D t_source;    // rgb: mean; w: variance of its luminance
@@ -12,7 +12,7 @@ uniform int u_step;            // pixels
 
 layout(location = 0) out vec4 o_color;
 
-const float SIGMA_LUMINANCE = 2.0;
+const float SIGMA_LUMINANCE = 2.0, NOISE = 2.0;   // standard deviations
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy), size = textureSize(t_source, 0);
@@ -34,7 +34,8 @@ void main() {
         vec4 other = texelFetch(t_source, at, 0);
         float deviation = sqrt(0.5 * (center.w + other.w));
 #if GUIDED
-        float difference = abs(texelFetch(t_guide, at, 0).r - luminance);
+        float beyond_noise = abs(svgf_luminance(other.rgb - center.rgb)) - NOISE * sqrt(center.w + other.w);
+        float difference = max(abs(texelFetch(t_guide, at, 0).r - luminance), beyond_noise);
 #else
         float difference = abs(svgf_luminance(other.rgb) - luminance);
 #endif

@@ -6,7 +6,7 @@ uniform sampler2D t_reprojected;
 uniform sampler2D t_moments;
 
 layout(location = 0) out vec4 o_difference;  // over pixels with a history: sum of new - old, of its square, of 1 / frames, pixels
-layout(location = 1) out vec4 o_noise;       // sums too: variance of a pixel over space, 0; variance over time, pixels
+layout(location = 1) out vec4 o_noise;       // variance of pixels over space; root of the sum of (new - old)^4; variance over time, its pixels
 layout(location = 2) out vec2 o_doubt;       // sums of the resampling's doubt, and of its square
 
 // The mixed difference of a quad of pixels knows nothing of what is constant or runs along one axis, but all of the noise.
@@ -36,6 +36,7 @@ void main() {
             frames = min(frames, before.w);
             float difference = now[k] - then[k];
             o_difference += vec4(difference, difference * difference, 1.0 / before.w, 1.0);
+            o_noise.y = svgf_hypotenuse(o_noise.y, difference * difference);
             vec4 moments = texelFetch(t_moments, min(pixel, last), 0);
             o_doubt += vec2(moments.z, moments.z * moments.z);
             if (before.w < 3.5) continue;   // no variance over time to speak of yet

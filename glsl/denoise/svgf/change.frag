@@ -5,9 +5,10 @@ uniform sampler2D t_difference;
 uniform sampler2D t_noise;
 uniform sampler2D t_doubt;
 
-// How many times what the noise makes of them is put down to noise, so that it seldom is taken for a change: the mean squared
-// difference of pixels; that of the means of 25 blocks; the difference of the mean of 9. And of the resampling's doubt.
-const float PIXELS = 1.2, BLOCKS = 1.3, MEAN = 7.0, DOUBT = 4.0;
+// A mean of squares is known to its standard error, which a few bright pixels may make as large as the mean: so many of them are put down to
+// noise. How many times its expectation is for the one difference of the mean of 9 blocks, which has no such error; how many times the
+// resampling's doubt is.
+const float STANDARD_ERRORS = 1.0, MEAN = 7.0, DOUBT = 4.0;
 // An error that neighbours share passes the filter over space, noise does not: it counts as much more as that takes of the noise, about.
 const float GAIN = 16.0;
 
@@ -20,6 +21,7 @@ void main() {
     vec3 blocks = vec3(0.0);
     vec2 doubt = vec2(0.0);
     float near_doubt = 0.0;
+    vec2 error = vec2(0.0);     // of the sums of squares, by pixels and by blocks
     for (int i = 0; i < 25; ++i) {
         ivec2 offset = ivec2(i % 5, i / 5) - 2, at = block + offset;
         if (any(lessThan(at, ivec2(0))) || any(greaterThan(at, last))) continue;
@@ -27,10 +29,13 @@ void main() {
         if (d.w <= 0.0) continue;
         bool inner = max(abs(offset.x), abs(offset.y)) < 2;
         vec2 q = texelFetch(t_doubt, at, 0).xy;
-        blocks += vec3(d.x * d.x / d.w, 1.0, q.x * q.x / d.w);
+        vec4 n = texelFetch(t_noise, at, 0);
+        float squared = d.x * d.x / d.w;
+        blocks += vec3(squared, 1.0, q.x * q.x / d.w);
+        error = vec2(svgf_hypotenuse(error.x, n.y), svgf_hypotenuse(error.y, squared));
         doubt += q;
         difference += d;
-        noise += texelFetch(t_noise, at, 0);
+        noise += n;
         if (inner) { near += d; near_doubt += q.x; }
     }
     if (difference.w < 8.0 || difference.y <= 0.0) return;
@@ -40,9 +45,9 @@ void main() {
     one = max(one, 1e-4 * difference.y / difference.w);
     float both = one * (1.0 + difference.z / difference.w);    // of new - old, if the light stands still
     // Besides: what resampling alone may have done, by pixels and by what their errors have in common.
-    float by_pixels = difference.y / difference.w - PIXELS * both - DOUBT * doubt.y / difference.w;
+    float by_pixels = difference.y / difference.w - both - (STANDARD_ERRORS * error.x + DOUBT * doubt.y) / difference.w;
     // Of means, in units of a pixel's variance.
-    float by_blocks = blocks.x / blocks.y - BLOCKS * both - DOUBT * blocks.z / blocks.y;
+    float by_blocks = blocks.x / blocks.y - both - (STANDARD_ERRORS * error.y + DOUBT * blocks.z) / blocks.y;
     float by_mean = near.w > 8.0 ? near.x * near.x / near.w - MEAN * both - DOUBT * near_doubt * near_doubt / near.w : 0.0;
     float change = max(max(by_pixels, by_blocks), max(by_mean, 0.0)) * GAIN / one;
     o_change = change < 1e6 ? change : 1e6;     // also for NaN

@@ -1,5 +1,5 @@
-// What the last frame held at the surface of this pixel: cubic where all around shows it, else bilinear over those of four texels that
-// do (Schied et al. 2017, sec. 4.1).
+// What the last frame held at the surface of this pixel: by a polynomial where all around shows it, else bilinear over those of four texels
+// that do (Schied et al. 2017, sec. 4.1).
 #include "denoise/svgf/geometry.glsl"
 
 uniform sampler2D t_motion;
@@ -21,12 +21,13 @@ vec3 previous_position(vec2 uv, float depth_m) {
     return (u_previous_world_from_camera * vec4(xy, -depth_m, 1.0)).xyz;
 }
 
-// Weights of four texels in a row for a point f beyond the second (Catmull, Rom 1974): a bilinear history, resampled in every frame of a
-// pan, would blur.
-vec4 cubic(float f) {
-    vec4 w = vec4(f * (-0.5 + f * (1.0 - 0.5 * f)), 1.0 + f * f * (-2.5 + 1.5 * f), f * (0.5 + f * (2.0 - 1.5 * f)), 0.0);
-    w.w = 1.0 - w.x - w.y - w.z;
-    return w;
+// Weights of TAPS texels in a row (an even number; 2: bilinear) for a point f beyond the first of the middle two: Lagrange's polynomial
+// through them. A history takes along its resampling's errors from frame to frame: bilinear it blurs, by Catmull and Rom's cubic it rings.
+void weights(float f, out float w[TAPS]) {
+    for (int i = 0; i < TAPS; ++i) {
+        w[i] = 1.0;
+        for (int j = 0; j < TAPS; ++j) if (j != i) w[i] *= (f + float(TAPS / 2 - 1 - j)) / float(i - j);
+    }
 }
 
 // The history at a texel, with w = 0 where it is not that of this surface.
@@ -53,29 +54,28 @@ void main() {
     if (!svgf_is_finite(vec4(motion, 0.0, 0.0))) return;
     vec2 at = gl_FragCoord.xy + (u_history_shift - motion) * vec2(size) - 0.5;
     vec2 base = floor(at + 1e-3), f = max(at - base, vec2(0.0));
-#if CUBIC
-    vec4 wx = cubic(f.x), wy = cubic(f.y);
-#else
-    vec4 wx = vec4(0.0, 1.0 - f.x, f.x, 0.0), wy = vec4(0.0, 1.0 - f.y, f.y, 0.0);
-#endif
+    float wx[TAPS], wy[TAPS];
+    weights(f.x, wx);
+    weights(f.y, wy);
     float width = svgf_pixel_width(here.depth_m), total = 0.0, total_inner = 0.0;
     vec4 inner = vec4(0.0);
     vec2 nearest = vec2(0.0);   // its luminance, its weight
     // A view that stands still needs one texel; llvmpipe leaves a loop when all pixels are done with it.
-    ivec2 moves = ivec2(greaterThan(f, vec2(1e-3))), columns = 1 + 3 * moves;
+    ivec2 moves = ivec2(greaterThan(f, vec2(1e-3))), columns = 1 + (TAPS - 1) * moves;
     for (int i = 0; i < columns.x * columns.y; ++i) {
-        ivec2 k = ivec2(i % columns.x, i / columns.x) + 1 - moves;
+        ivec2 k = ivec2(i % columns.x, i / columns.x) + (TAPS / 2 - 1) * (1 - moves);
         float w = wx[k.x] * wy[k.y];
         if (abs(w) < 1e-4) continue;
-        ivec2 texel = ivec2(base) + k - 1;
+        ivec2 texel = ivec2(base) + k - (TAPS / 2 - 1);
         vec4 color = history_at(texel, here, width);
         if (color.w <= 0.0) continue;
         o_color += w * color;
         total += w;
-        if (any(lessThan(k, ivec2(1))) || any(greaterThan(k, ivec2(2)))) continue;
+        ivec2 q = k - (TAPS / 2 - 1);
+        if (any(lessThan(q, ivec2(0))) || any(greaterThan(q, ivec2(1)))) continue;
         vec2 moments = texelFetch(t_moments, texel, 0).rg;
         if (!svgf_is_finite(moments.xyxy)) continue;
-        vec2 near = mix(1.0 - f, f, vec2(k - 1));
+        vec2 near = mix(1.0 - f, f, vec2(q));
         inner += near.x * near.y * color;
         if (near.x * near.y > nearest.y) nearest = vec2(svgf_luminance(color.rgb), near.x * near.y);
         o_moments.xy += near.x * near.y * moments;
@@ -84,9 +84,9 @@ void main() {
     if (total_inner < 0.01) { o_color = vec4(0.0); o_moments = vec4(0.0); return; }
     inner /= total_inner;
     o_moments.xy /= total_inner;
-    // Where some of the four are missing, the others are all that is known.
+    // Where some of the four are missing, the others are all that is known. Beside a line a polynomial undershoots, light does not.
     bool whole = total_inner > 0.999 && total > 0.5;
-    o_color = vec4(whole ? o_color.rgb / total : inner.rgb, inner.w);
+    o_color = vec4(whole ? max(o_color.rgb / total, vec3(0.0)) : inner.rgb, inner.w);
     // An edge between texels could as well be anywhere between them: the history is off by about what shifting the nearest one by makes.
     o_moments.z = nearest.x - svgf_luminance(o_color.rgb);
 }

@@ -1,6 +1,7 @@
 // Variance of the accumulated mean: over time where the history has some frames, over space where it has not (Schied et al. 2017, sec. 4.2).
 // Pooled over neighbours on one surface: single pixels of a sparse estimate do not know their own variance. Where the method tells how
-// many samples a pixel holds, over space it is no more than that of independent ones: a focus of many photons is no noise.
+// many samples a pixel holds, it is no more than that of independent ones, and a pixel's share of it goes by the samples that it gets, as
+// their number's variance does (Poisson): a focus of many photons is no noise, nor is the dark beside it as noisy as the focus.
 #include "denoise/svgf/geometry.glsl"
 
 uniform sampler2D t_color;
@@ -9,6 +10,8 @@ uniform sampler2D t_noisy;     // this frame; w: samples in the pixel, 0 where t
 
 layout(location = 0) out vec4 o_estimate;  // rgb: mean; w: variance of its luminance
 layout(location = 1) out float o_guide;    // luminance, smoothed over 3 x 3 pixels
+
+const float UNSEEN = 0.1;   // samples that may yet come to a pixel where none has
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy), size = textureSize(t_color, 0);
@@ -22,7 +25,8 @@ void main() {
     // Over space: the mixed difference of quads of pixels, which knows nothing of light that is constant or runs along one axis.
     // A plain variance would take the caustic itself for noise and blur it.
     float over_space = 0.0, quads = 0.0;
-    vec2 counted = vec2(0.0);   // variance of a sum of independent samples in one frame: their squares; samples
+    vec2 counted = vec2(0.0);   // sums over samples of this frame: of their squares; of them
+    float level = 0.0;          // of the mean
     vec2 above[5];
     for (int y = 0; y < 5; ++y) {
         vec2 left = vec2(0.0);
@@ -37,9 +41,10 @@ void main() {
                 one = vec2(svgf_luminance(other.rgb), w);
                 over_time += w * max(moments.y - moments.x * moments.x, 0.0) / max(other.w - 1.0, 1.0);
                 weight += w;
+                level += w * one.x;
                 vec4 noisy = texelFetch(t_noisy, at, 0);
                 float lone = svgf_luminance(noisy.rgb);
-                if (svgf_is_finite(noisy) && noisy.w > 0.0) counted += w * vec2(lone * lone / noisy.w, noisy.w);
+                if (svgf_is_finite(noisy) && noisy.w > 0.0) counted += w * vec2(lone * lone / noisy.w, lone);
                 int off_x = abs(x - 2), off_y = abs(y - 2);
                 if (max(off_x, off_y) < 2) narrow += w / float((1 + off_x) * (1 + off_y)) * vec2(one.x, 1.0);
             }
@@ -54,9 +59,14 @@ void main() {
         }
         above[4] = left;
     }
-    over_time /= max(weight, 1e-6);
+    weight = max(weight, 1e-6);
+    over_time /= weight;
     over_space /= max(quads, 1e-6);
-    if (counted.y > 0.0) over_space = min(over_space, counted.x / (max(weight, 1e-6) * max(color.w, 1.0)));
     o_guide = narrow.x / max(narrow.y, 1e-6);
-    o_estimate.w = mix(over_space, over_time, smoothstep(2.0, 5.0, color.w));
+    float variance = mix(over_space, over_time, smoothstep(2.0, 5.0, color.w));
+    float frames = max(color.w, 1.0), one_sample = counted.y > 0.0 ? counted.x / counted.y : 0.0;   // what it brings to a pixel
+    float independent = one_sample * max(level / weight, 0.0) / frames;
+    if (independent > 0.0)
+        variance = min(variance / independent, 1.0) * one_sample * (max(o_guide, 0.0) + UNSEEN * one_sample / frames) / frames;
+    o_estimate.w = variance;
 }
