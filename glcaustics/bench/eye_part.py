@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from glcaustics.bench.cells import Measured, Part
+from glcaustics.bench.convergence import seeded_cameras
 from glcaustics.bench.eye_cost import eye_cost
-from glcaustics.bench.eye_rays import PUBLISHED, eye_study, seeded_cameras
+from glcaustics.bench.eye_rays import PUBLISHED, eye_study
 from glcaustics.bench.light_rays import light_study
 from glcaustics.bench.machine import instrument_key
 from glcaustics.bench.measure import picture
@@ -19,7 +20,7 @@ from glcaustics.scene.load import load_scene
 
 FloatArray = npt.NDArray[np.float64]
 NOTHING = {"none": np.zeros(0)}  # a cell has arrays; these have none to keep
-INSTRUMENTS = ("eye_rays", "eye_truth", "eye_cost", "light_rays", "light_solver", "convergence")
+INSTRUMENTS = ("eye_rays", "eye_truth", "eye_cost", "light_rays", "light_solver", "solver_variants", "convergence")
 
 
 def count_steps(plan: Plan) -> int:

@@ -11,8 +11,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from glcaustics.bench.convergence import ITERATIONS, SCENES, look_at, pooled, seeded_cameras
+from glcaustics.bench.convergence import ITERATIONS, SCENES, pooled, seeded_cameras
 from glcaustics.bench.eye_truth import EyeTruth, eye_truth, has_open_surface, solid_truth
 from glcaustics.errors import UsageError
 from glcaustics.gpu import create_device
@@ -20,13 +21,11 @@ from glcaustics.renderer import Renderer
 from glcaustics.scene.load import load_scene
 from glcaustics.scene.model import Camera, FloatArray, Scene
 
-__all__ = ["PUBLISHED", "SCENES", "EyeConvergence", "eye_convergence", "eye_study", "look_at", "main", "seeded_cameras"]
-
 SOLVED_BY_NEWTON, SOLVED_BY_MARCHING = 1, 5  # of `solve_status`
 _AOVS = ("solve_status", "solve_hit")
 _STEPS = {"refraction_steps": 16384, "reflection_steps": 1}  # refracted rays are judged; reflections only cost
 
-# The published code on its own pool, measured for shared/peers.md: 1280x720, views A (31 % water) and B (99 % water).
+# The published code on its own pool, as we measured it: 1280x720, views A (31 % water) and B (99 % water).
 PUBLISHED: dict[str, dict[str, Any]] = {
     "published, view A": {"iterations": (1, 2, 3, 4, 7), "within_1px": (0.62, 0.89, 0.941, 0.942, 0.945), "dda": 0.987},
     "published, view B": {
@@ -147,7 +146,8 @@ def solids_truth(
     ]
 
 
-def _near(px: FloatArray, hit: FloatArray) -> Any:
+def _near(px: FloatArray, hit: FloatArray) -> npt.NDArray[np.bool_]:
+    """(n,): which of the pixels (n, 2) lie within one of the hits, by the larger coordinate."""
     return np.abs(px - hit).max(axis=-1) <= 1.0
 
 

@@ -16,9 +16,7 @@ from glcaustics.bench import caustics_part, eye_part, mesh_part, photons_part, s
 from glcaustics.bench.cells import Cells
 from glcaustics.bench.machine import code_key, commit, machine, versions
 from glcaustics.bench.marks import marks
-from glcaustics.bench.plan import FULL, PARTS, QUICK, Plan
-
-__all__ = ["FULL", "PARTS", "QUICK", "SCHEMA", "Plan", "Study"]
+from glcaustics.bench.plan import PARTS, Plan
 
 SCHEMA = "glcaustics-bench/1"
 FloatArray = npt.NDArray[np.float64]

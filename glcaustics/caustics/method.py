@@ -23,7 +23,7 @@ def irradiance_of(layer: str) -> str:
 
 
 class CausticsMethod(ABC):
-    """A way to compute the caustic irradiance E_c (methods.md 1) at the camera's opaque pixels.
+    """A way to compute E_c, the irradiance by refracted and reflected light, at the camera's opaque pixels.
 
     A method adds its passes to the graph in `declare`; the last of them writes `caustics.irradiance`. One instance
     serves one renderer, so it may keep what it measured in `prepare`.

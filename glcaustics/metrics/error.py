@@ -69,7 +69,7 @@ def relative_rmse(
             b, and its own noise is taken off: mean((t - a)(t - b)) is the squared error of t without the variance
             of the halves, since their noises are independent. May come out as 0 where the noise exceeds the error.
         mask: (H, W), pixels that count.
-        normalise: divide each image by its mean first (error of the pattern alone; how peers.md compares).
+        normalise: divide each image by its mean first (error of the pattern alone; as published code is compared).
     """
     where = "relative_rmse"
     a, t = checked_pair(reference, test, mask, where=where)

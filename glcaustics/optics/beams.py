@@ -16,7 +16,7 @@ from glcaustics.optics.pixels import bin_points, pixel_areas
 FloatArray = npt.NDArray[np.float64]
 BEAMS_PER_CHUNK = 1 << 18  # a chunk's dozen arrays stay in the cache of a small machine
 
-# (wavelength m, direction deg, phase rad) of the pool that published implementations were measured on (peers.md)
+# (wavelength m, direction deg, phase rad) of the pool that published implementations were measured on
 PEER_POOL_WAVES = ((0.70, 20.0, 0.3), (0.45, 100.0, 1.7), (0.31, -35.0, 4.1), (0.23, 65.0, 2.2))
 
 
@@ -62,7 +62,7 @@ def sine_field(waves: Sequence[tuple[float, float, float, float]]) -> HeightFiel
 
 
 def peer_pool_field(strength: float) -> HeightField:
-    """The `peer-pool` water (peers.md): four waves of amplitude 1.5 s / k^2; floor at y = -1, ior 1.333."""
+    """The `peer-pool` water: four waves of amplitude 1.5 s / k^2; floor at y = -1, ior 1.333."""
     waves = []
     for wavelength_m, direction_deg, phase in PEER_POOL_WAVES:
         k = 2.0 * math.pi / wavelength_m

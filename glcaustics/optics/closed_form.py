@@ -1,4 +1,4 @@
-"""The closed forms that every caustics method is tested on (methods.md, section 1), one class or function a truth.
+"""The closed forms that every caustics method is tested on, one class or function a truth.
 
 1. `flat_directional_irradiance`   2. `flat_point_irradiance`, `flat_point_flux`   3. `SineWater`   4. `GlassSphere`
 5. `MirrorCylinder`   6. flux totals: `flat_point_flux`, `SineWater.flux_per_m`, `GlassSphere.transmitted_flux`,
@@ -50,7 +50,7 @@ def flat_directional_irradiance(
     depth_m: float = 0.0,
     sigma_a_per_m: float = 0.0,
 ) -> FloatArray:
-    """Irradiance of a floor parallel to a flat interface under directional light: a constant (methods.md 1.1).
+    """Irradiance of a floor parallel to a flat interface under directional light: a constant.
 
     E = E_perp cos t T(t) exp(-sigma_a d / cos t'), t' the refracted angle. What a patch of the interface lets through
     lands on a patch of equal area, so no angle of the refracted ray enters but through absorption.
@@ -101,7 +101,7 @@ def flat_point_irradiance(
     intensity: float = 1.0,
     sigma_a_per_m: float = 0.0,
 ) -> FloatArray:
-    """Irradiance of a floor under a flat interface, lit by a point light (methods.md 1.2).
+    """Irradiance of a floor under a flat interface, lit by a point light.
 
     Light h above the interface, floor d below: r(t) = h tan t + d tan t', sin t' = n sin t. The ring between t and
     t + dt receives I T exp(-sigma_a d / cos t') 2 pi sin t dt, so
@@ -135,7 +135,7 @@ def flat_point_flux(
     sigma_a_per_m: float = 0.0,
     nodes: int = 256,
 ) -> float:
-    """Flux that a point light sends through a flat rectangle of interface to the floor below, W (methods.md 1.6).
+    """Flux that a point light sends through a flat rectangle of interface to the floor below, W.
 
     Integral of I T exp(-sigma_a d / cos t') cos t / (distance^2) over the rectangle centred under the light, by
     Gauss-Legendre quadrature.

@@ -20,7 +20,7 @@ FloatArray = npt.NDArray[np.float64]
 class SineWater:
     """Water y = a cos(kx) for x in `x_range_m`, a flat floor at y = -depth, light along (sin t, -cos t, 0).
 
-    The light map is x' = x + (depth + y) t_x / (-t_y) with t the refracted direction (Snell), and (methods.md 1.3)
+    The light map is x' = x + (depth + y) t_x / (-t_y) with t the refracted direction (Snell), and
     E(x') = sum over preimages of E_perp (cos t + y' sin t) T exp(-sigma_a s) / |dx'/dx|, s the length of the path in
     the water. All y are heights, y' the slope.
     """

@@ -19,7 +19,7 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.floating]
 IntArray = npt.NDArray[np.integer]
 
-MIRROR_MAX_ROUGHNESS = 0.3  # design.md: metallic with roughness <= 0.3 reflects caustics
+MIRROR_MAX_ROUGHNESS = 0.3  # metallic with roughness <= 0.3 reflects caustics
 MIRROR_MIN_METALLIC = 0.5
 MIN_TRANSMISSION = 0.5  # a surface that lets less than half of the light through is treated as opaque
 

@@ -1,4 +1,4 @@
-"""Every caustics method against the closed forms (methods.md, section 1), at quality high, seen straight from above.
+"""Every caustics method against the closed forms, at quality high, seen straight from above.
 
 Definitions, used throughout: both images are box filtered to 128 x 128. Relative RMSE = sqrt(mean((E - E_ref)^2)) /
 mean(E_ref), both means over the case's region and the three channels. The region is the lit part of the receiver

@@ -41,7 +41,7 @@ def interleaved_medians(scene_name: str, size: tuple[int, int], methods: tuple[s
 
 @pytest.mark.parametrize("method", ["caustic_map", "displaced_mesh"])
 def test_caustics_at_most_double_the_frame(method: str) -> None:
-    """Issue 2: `pool` at 1280x720, quality medium, in at most twice the cost of the same frame with caustics off."""
+    """`pool` at 1280x720, quality medium, in at most twice the cost of the same frame with caustics off."""
     off, on = interleaved_medians("pool", (1280, 720), ("none", method), rounds=5)
     print(f"pool 1280x720 medium: none {off:.0f} ms, {method} {on:.0f} ms, ratio {on / off:.2f}")
     assert on <= 2.0 * off

@@ -1,4 +1,4 @@
-"""The displaced mesh on `peer-pool` (issue 4, part 4): error, order, energy, folds, and what its drawing costs.
+"""The displaced mesh on `peer-pool`: error, order, energy, folds, and what its drawing costs.
 
 The eye looks straight down, past the water; each picture is box filtered to 512 x 512 bins over |x|, |z| < 1 m and
 divided by its mean over |x|, |z| < 0.75 m. Truths: without folds, Newton's method on the analytic light map (no noise);

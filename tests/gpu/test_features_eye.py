@@ -31,7 +31,7 @@ def eye_at(theta_deg: float, distance_m: float = 3.0) -> Camera:
 @pytest.mark.parametrize("absorbing", [False, True])
 @pytest.mark.parametrize("theta", [0.0, pytest.param(40.0, marks=pytest.mark.smoke), 65.0])
 def test_floor_under_flat_water(theta: float, absorbing: bool) -> None:
-    """L = T(eye) rho E / (pi n^2) exp(-sigma d / cos t'), E = E_perp T(light) exp(-sigma d) (methods.md, section 1)."""
+    """L = T(eye) rho E / (pi n^2) exp(-sigma d / cos t'), E = E_perp T(light) exp(-sigma d)."""
     depth = 0.4
     material = replace(WATER, attenuation_color=(0.1, 0.5, 0.9), attenuation_distance_m=1.0) if absorbing else WATER
     scene = scene_of(

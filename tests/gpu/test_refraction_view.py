@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import glcaustics as glc
-from glcaustics.bench.eye_rays import eye_convergence, look_at, seeded_cameras
+from glcaustics.bench.convergence import look_at, seeded_cameras
+from glcaustics.bench.eye_rays import eye_convergence
 from glcaustics.errors import UsageError
 from glcaustics.passes.refraction import SOLVERS
 from glcaustics.renderer import plan_frame
@@ -68,7 +69,7 @@ def test_planes_are_written_only_where_they_are_read() -> None:
 
 
 def test_shares_of_solved_pixels_in_the_pool() -> None:
-    """Issue 4's marks on seeded views: 99 % within 3 iterations, cascade 99.5 % of what pixel-exact marching solves."""
+    """The marks on seeded views: 99 % within 3 iterations, cascade 99.5 % of what pixel-exact marching solves."""
     scene = glc.load_scene("pool")
     for found in eye_convergence(scene, seeded_cameras(scene, 3), (480, 270), (1, 2, 3, 4), backend=BACKEND):
         assert found.pixels > 5000 and found.resolvable > 0.4

@@ -1,6 +1,6 @@
 """A wrong method must be caught: known faults are seeded into a copy of the shaders, and the metrics must see each one.
 
-Each fault is one that published code has (peers.md). It counts as seen when a metric is both beyond the limit that the
+Each fault is one that published code has. It counts as seen when a metric is both beyond the limit that the
 tests of the healthy method set, and several times the healthy run's own value.
 """
 

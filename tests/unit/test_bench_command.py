@@ -14,8 +14,9 @@ import pytest
 
 import glcaustics
 from glcaustics.bench.page import page
+from glcaustics.bench.plan import FULL, QUICK
 from glcaustics.bench.store import CACHE_ENV, Store, default_cache, digest, scene_key
-from glcaustics.bench.study import FULL, QUICK, SCHEMA, Study
+from glcaustics.bench.study import SCHEMA, Study
 from glcaustics.bench.targets import TARGETS, bench_scene
 from glcaustics.cli import main
 from glcaustics.errors import UsageError

@@ -9,7 +9,7 @@ uniform float u_change;      // relative change of the density over a texel that
 layout(location = 0) out vec4 o_cell;   // of both triangles: largest density, and the factor that keeps its flux; 0: not drawn
 layout(location = 1) out vec4 o_weight; // x: share that triangles take, 0 (unresolved, or an edge runs through) .. 1; y: flux drawn / flux
 
-const float DENSITY_CAP = 1.5;  // times flux / area of the triangle: methods.md 3
+const float DENSITY_CAP = 1.5;  // times flux / area of the triangle
 
 float cross2(vec2 a, vec2 b) { return a.x * b.y - a.y * b.x; }
 

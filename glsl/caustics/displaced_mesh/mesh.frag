@@ -1,4 +1,4 @@
-// Flux per texel of the map: flux of the vertex's texel / landed area, by the interpolated signed determinant (methods.md 3).
+// Flux per texel of the map: flux of the vertex's texel / landed area, by the interpolated signed determinant.
 in vec4 v_flux_det;
 flat in vec2 v_density;
 

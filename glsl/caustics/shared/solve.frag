@@ -2,7 +2,7 @@
 // specular surface in this texel is refracted (or reflected), its landing point found, its flux weighed. They displace a
 // vertex grid in the vertex shader; a fragment solves the same and leaves it in a texture, which the splat and the statistics share.
 //
-// Flux of a texel: exact, E_perp x cross-section or I x solid angle (methods.md 1). NAIVE_FLUX 1 is their eq. 6, N.L / V, the baseline.
+// Flux of a texel: exact, E_perp x cross-section or I x solid angle. NAIVE_FLUX 1 is their eq. 6, N.L / V, the baseline.
 // BRANCH: GLC_REFLECT, GLC_THROUGH (an open interface) or GLC_IN_AND_OUT (a solid's two).
 #define GLC_REFLECT 0
 #define GLC_THROUGH 1
