@@ -169,7 +169,7 @@ def _program(ctx: PassContext, outputs: dict[str, int], shader: str = SHADER, /,
         "FINISH": stage.get("FINISH", 0),
         "SEEDED": stage.get("SEEDED", 0),
         "CONTINUED": stage.get("CONTINUED", 0),
-        **specular_layers.defines(ctx, continued="CONTINUED" in stage),
+        **specular_layers.defines(ctx, continued="CONTINUED" in stage, behind=shader == BEHIND),
         "USE_NEWTON": stage["NEWTON"],
         # The cascade marches instead; and with few look-ups there is no time for it.
         "RESTARTS": int(ctx.setup.options["refraction"] == "newton" and ctx.setup.options["refraction_iterations"] > 4),
@@ -182,8 +182,6 @@ def _program(ctx: PassContext, outputs: dict[str, int], shader: str = SHADER, /,
     specular = [item for item in ctx.frame.gpu.items if item.kind in SPECULAR_KINDS]
     one = specular[0].instance.material if len(specular) == 1 and specular[0].kind is not OpticalKind.MIRROR else None
     defines["ONE_OBJECT"] = KIND_INDEX[specular[0].kind] if one is not None else 0
-    if shader == BEHIND:
-        defines["NESTED"] = specular_layers.nested(ctx)
     program = ctx.device.program(shader, defines, vertex=f"{SHADER}.vert")
     if one is not None:
         program.set(u_one_ior=one.ior_rgb(), u_one_sigma_a=one.sigma_a, u_one_transmission=one.transmission)

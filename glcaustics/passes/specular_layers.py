@@ -188,15 +188,13 @@ def shown(ctx: PassContext) -> InView | None:
     return in_view(ctx.frame, ctx.setup.size) if ctx.has(CHAIN) else None
 
 
-def defines(ctx: PassContext, *, continued: bool) -> dict[str, int]:
-    """What the refraction shader has to know of first surfaces: whether solids float in open waters."""
-    floats = not continued and ctx.frame.gpu.touch(OpticalKind.SOLID, OpticalKind.INTERFACE) and shown(ctx) is not None
-    return {"EXITS_UNDER": int(floats)}
-
-
-def nested(ctx: PassContext) -> int:
-    """1 where some solid may hold another one, or a mirror."""
-    return int(ctx.frame.gpu.touch(OpticalKind.SOLID, OpticalKind.SOLID, OpticalKind.MIRROR))
+def defines(ctx: PassContext, *, continued: bool, behind: bool) -> dict[str, int]:
+    """What the refraction shader has to know: whether solids float in open waters, and in the stages of this layer,
+    whether some may hold others."""
+    gpu = ctx.frame.gpu
+    floats = not continued and gpu.touch(OpticalKind.SOLID, OpticalKind.INTERFACE) and shown(ctx) is not None
+    nested = (continued or behind) and gpu.touch(OpticalKind.SOLID, OpticalKind.SOLID, OpticalKind.MIRROR)
+    return {"EXITS_UNDER": int(floats), "NESTED": int(nested)}
 
 
 def clear_candidates(ctx: PassContext) -> dict[str, str]:
@@ -247,4 +245,6 @@ _SECOND = {
     "t_back_normal": "specular2.back_normal_ws",
     "t_first_plane": "specular.plane",
     "t_first_normal": "specular.normal_ws",
+    "t_first_back_plane": "specular.back_plane",
+    "t_first_back_normal": "specular.back_normal_ws",
 }

@@ -204,7 +204,7 @@ def test_a_floating_ball_ends_under_water() -> None:
 
 
 def test_a_block_cast_into_glass() -> None:
-    """A solid within a solid: entered with the ratio of both indices, left into air through a parallel wall."""
+    """A solid within a solid: entered and left with the ratio of both indices, then out of the outer one."""
     dense = replace(GLASS, name="flint", ior=1.8, attenuation_color=(0.9, 0.5, 0.4), attenuation_distance_m=0.5)
     parts = [box("case", (3.0, 3.0, 0.6), (0.0, 0.0, 0.0), GREEN), box("core", (2.6, 2.6, 0.5), (0.0, 0.0, 0.0), dense)]
     camera = Camera.look_at((1.2, 0.6, 3.0), (0.0, 0.0, -0.2), yfov_rad=0.4)
@@ -217,11 +217,37 @@ def test_a_block_cast_into_glass() -> None:
     path.refract(Z, N_GLASS, 1.8)
     core = path.alive & (np.abs(path.p[..., :2]) < 1.1).all(axis=2)
     path.to_plane(Z, -0.25, dense.sigma_a)
-    path.refract(Z, 1.8, 1.0)
+    path.refract(Z, 1.8, N_GLASS)
+    path.to_plane(Z, -0.3, GREEN.sigma_a)
+    path.refract(Z, N_GLASS, 1.0)
     path.to_plane(Z, -3.0)
     off, ratio = compare(frame, camera, path, core)
     assert off.max() < 0.02
     np.testing.assert_allclose(ratio, 1.0, rtol=2e-3)
+
+
+def test_a_ball_in_a_block_of_water() -> None:
+    """Out of the ball the ray is in the water still, and leaves that through the block's far side."""
+    centre, radius = np.zeros(3), 0.4
+    ball = Instance("ball", icosphere("ball", radius, 48), GREEN)
+    tank = box("tank", (3.0, 2.4, 1.4), (0.0, 0.0, 0.0), SEA)
+    camera = Camera.look_at((0.4, 0.3, 3.0), (0.0, 0.0, 0.0), yfov_rad=0.35)
+    wall = box("wall", (40.0, 40.0, 0.2), (0.0, 0.0, -2.1), GLOW)
+    scene = scene_of([wall, tank, ball], [sun(0.0, 1e-3)], camera, sky=BLACK)
+    frame, path = look(scene), Path(camera)
+    path.to_plane(Z, 0.7)
+    path.refract(Z, 1.0, N_WATER)
+    path.to_sphere(centre, radius, SEA.sigma_a)
+    core = path.alive & (-(path.p * path.d).sum(axis=2) > 0.35 * radius)
+    path.refract(path.p / radius, N_WATER, N_GLASS)
+    path.to_sphere(centre, radius, GREEN.sigma_a, far=True)
+    path.refract(path.p / radius, N_GLASS, N_WATER)
+    path.to_plane(Z, -0.7, SEA.sigma_a)
+    path.refract(Z, N_WATER, 1.0)
+    path.to_plane(Z, -2.0)
+    off, ratio = compare(frame, camera, path, core)
+    assert np.percentile(off, 95) < 0.25 and np.median(off) < 0.05
+    np.testing.assert_allclose(np.percentile(ratio, (2, 50, 98)), 1.0, rtol=0.01)
 
 
 def test_a_mirror_behind_a_pane() -> None:

@@ -39,9 +39,9 @@ Surface continued_surface(ivec2 pixel) {
     at.v = way.xyz;
     at.depth_m = 0.0;
     at.before = medium_of(point.w);
-    // A solid within a solid touches its outside sooner or later, through a wall that bends nothing more.
     at.around = at.before;
-    if (point.w > 0.0 && at.before.solid > 0.0) at.around = medium_of(MEDIUM_OF_EYE);
+    at.contained = point.w > 0.0 && at.before.solid > 0.0;
+    if (at.contained) at.around = medium_of(MEDIUM_OF_EYE);
     at.carries = texelFetch(t_share, pixel, 0).rgb;
     set_surface(at, vec4(second_normal(at.p, way.w, -at.v), way.w));
     return at;

@@ -33,11 +33,17 @@ bool refracted_ray(Surface at, inout vec3 p, inout vec3 d, inout vec3 tint, out 
     if (at.object.kind == GLC_SOLID && !at.from_dense) {
 #if HAS_MEDIA
         float outside = at.around.ior / at.before.ior;
+#if CONTINUED && NESTED
+        if (at.contained) under = CONTAINED;
+#endif
 #else
         float outside = 1.0;
 #endif
         leaves = solid_through(p, d, at.object.ior.g, at.eta, at.object.sigma_a, tint, outside, under);
         tint /= outside * outside;
+#if CONTINUED && NESTED
+        if (leaves && under == CONTAINED) leaves = leave_first(p, d, at.around.ior / at.before.ior, at.before.sigma_a, tint);
+#endif
         ray = eye_ray(p, d);
     } else
 #endif

@@ -9,6 +9,7 @@ uniform sampler2D t_behind_normal;
 #endif
 
 const int SOLID_ITERATIONS = 5;
+#define CONTAINED -1.0   // for `under`: within another solid
 // How far off its own surface a reflected ray starts, of the way to there: rounding must not put it behind.
 const float REFLECTED_START = 2e-3;
 const int REFLECTED_STEPS = 4;
@@ -75,10 +76,39 @@ float interface_over(vec3 p) {
 }
 #endif
 
+#if CONTINUED && NESTED
+uniform sampler2D t_first_back_plane;
+uniform sampler2D t_first_back_normal;
+
+// Whether a point within the first surface's solid, or behind that, lies within: a liquid leaves its glass where it ends.
+bool within_first(vec3 p) {
+    vec4 q = u_raster_from_world * vec4(p, 1.0);
+    vec2 px = clamp(q.xy / q.w, vec2(0.0), u_raster_size - 0.001);
+    vec4 plane = texelFetch(t_first_back_plane, ivec2(px), 0);
+    return plane.w > 0.0 && q.z / q.w > plane.z + dot(plane.xy, px);
+}
+
+// Out of the first surface's solid through its far side. ior: of what is around that, relative to it. False: it is held inside.
+bool leave_first(inout vec3 p, inout vec3 d, float ior, vec3 sigma_a, inout vec3 tint) {
+    GlcRasterRay ray = eye_ray(p, d);
+    GlcSolve solve = glc_newton(t_first_back_plane, ray, 1.0, SOLID_ITERATIONS);
+    float u = solve.status == GLC_SOLVE_HIT ? solve.u : min(solve.u, solve.u_front), t = glc_raster_distance(ray, u);
+    vec2 uv = clamp((ray.start.xy + u * ray.step.xy) / u_raster_size, vec2(0.0), vec2(1.0));
+    vec3 n = glc_safe_normalize(textureLod(t_first_back_normal, uv, 0.0).xyz, -d), bent;
+    if (dot(n, d) > 0.0) n = -n;
+    p += t * d;
+    bool leaves = glc_refract(d, n, ior, bent);
+    tint *= glc_transmittance(sigma_a, t) * (leaves ? (1.0 - glc_fresnel_dielectric(-dot(n, d), ior)) / (ior * ior) : 1.0);
+    d = bent;
+    return leaves;
+}
+#endif
+
 // On entry d is the direction inside. tint takes Fresnel and absorption. Returns false where the light is still held inside after
 // one total internal reflection; d is then the direction that it would go on in. ior: solid_ior relative to what the ray came from; so
-// is outside, of what the solid stands in; under: object index + 1 of the interface that the exit lies below, 0 for none.
-bool solid_through(inout vec3 p, inout vec3 d, float solid_ior, float ior, vec3 sigma_a, inout vec3 tint, inout float outside, out float under) {
+// is outside, of what the solid stands in; under: object index + 1 of the interface that the exit lies below, 0 for none; before and after CONTAINED within another solid.
+bool solid_through(inout vec3 p, inout vec3 d, float solid_ior, float ior, vec3 sigma_a, inout vec3 tint, inout float outside, inout float under) {
+    bool contained = under == CONTAINED;
     under = 0.0;
     float leg_m = 0.0;
     for (int bounce = 0; bounce < 2; ++bounce) {
@@ -87,6 +117,10 @@ bool solid_through(inout vec3 p, inout vec3 d, float solid_ior, float ior, vec3 
         // The other side of the solid is often hidden after a reflection inside: then the mirrored direction alone goes on.
         if (!solid_exit(p, d, leg_m, exit_ws, n, t) && bounce > 0) return false;
         tint *= glc_transmittance(sigma_a, t);
+#if CONTINUED && NESTED
+        under = contained && within_first(exit_ws) ? CONTAINED : 0.0;
+        if (under == CONTAINED) outside = 1.0;
+#endif
 #if EXITS_UNDER
         under = interface_over(exit_ws);
         if (under > 0.0) outside = ior * glc_object(int(under + 0.5) - 1).ior.g / solid_ior;

@@ -39,6 +39,7 @@ struct Surface {
 #if HAS_MEDIA
     Medium before;       // what the ray to the surface runs in
     Medium around;       // what the rays behind a solid run in
+    bool contained;      // the surface lies within another closed solid, and `around` around that
     vec3 carries;        // of what leaves the surface, to the eye
 #endif
 };
@@ -80,6 +81,7 @@ Surface surface_at(ivec2 pixel) {
 #if HAS_EYE_MEDIUM
     at.before = Medium(u_eye_sigma_a, u_eye_ior, u_eye_solid);
     at.around = at.before;
+    at.contained = false;
     at.carries = glc_eye_transmittance(v_uv, at.depth_m, u_bounds_min_ws, u_bounds_max_ws);
 #endif
     set_surface(at, texelFetch(t_specular_normal, pixel, 0));
