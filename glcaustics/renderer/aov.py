@@ -23,9 +23,9 @@ AOVS: dict[str, str] = {
     "normal_ws": "normal of the first surface, towards the eye, world space",
     "position_ws": "position of the first surface, metres, world space",
     "albedo": "base colour of the opaque layer, linear",
-    "solve_status": "eye ray: 0 opaque, 1 solved by Newton's method, 2 sky, 3 fallback by estimate (Sousa 2005), "
-    "4 total internal reflection, 5 solved by marching, 6 leaves the picture, 7 hidden behind something, 8 solved in "
-    "the second depth layer",
+    "solve_status": "eye ray, behind the last specular surface followed: 0 opaque, 1 solved by Newton's method, 2 sky, "
+    "3 fallback by estimate (Sousa 2005), 4 total internal reflection, 5 solved by marching, 6 leaves the picture, "
+    "7 hidden behind something, 8 solved in the second depth layer",
     "solve_hit": "where the eye ray was solved: uv (origin at the bottom left), and the solver's error in pixels",
     "solve_iterations": "texel look-ups of the eye ray's solver",
 }
