@@ -83,18 +83,16 @@ def measure(case: Case, timing: Timing) -> tuple[dict[str, Any], FloatArray]:
     the wall clock up to `finish`; on a GPU the sum of its passes' timer queries. `time_ms` is of one frame: the image
     has taken `frames` of them.
     """
-    scene = replace(case.scene, camera=case.target.camera(), camera_at=None)
-    options = {**same_paths(case), **case.options}
     begin = time.perf_counter()
     renderer = Renderer(
-        scene,
+        replace(case.scene, camera=case.target.camera(), camera_at=None),
         size=(case.pixels, case.pixels),
         method=case.method,
         quality=case.quality,
         backend=case.backend,
         aovs=("caustic_irradiance",),
         specular_view=False,
-        options=options,
+        options={**same_paths(case), **case.options},
         keep=False,
     )
     with renderer:
@@ -106,28 +104,29 @@ def measure(case: Case, timing: Timing) -> tuple[dict[str, Any], FloatArray]:
             frame = renderer.render()
         image = luminance(frame.aov["caustic_irradiance"])
         values = timing.run(lambda: frame_ms(renderer))
-        stats, device = renderer.render().stats, renderer.device
-        row = {
-            "scene": scene.name,
-            "tool": "glcaustics",
-            "method": case.method,
-            "quality": case.quality,
-            "pixels": case.pixels,
-            "options": dict(renderer.options),
-            "overrides": dict(case.options),
-            "frames": case.frames,
-            "time_ms": summary(values, device.timer_kind),
-            "first_frame_ms": first_ms,
-            "passes": stats["passes"],
-            "bytes_allocated": stats["bytes_allocated"],
-            "bytes_without_aliasing": stats["bytes_without_aliasing"],
-            "bytes_without_culling": stats["bytes_without_culling"],
-            "lost_flux": stats["lost_flux"],
-            "rays": sum(s["rays"] for s in stats["solves"]),
-            "backend": device.backend,
-            "gl_renderer": device.info["renderer"],
-        }
-        return row, image
+        times = {"time_ms": summary(values, renderer.device.timer_kind), "first_frame_ms": first_ms}
+        return _row(case, renderer.render().stats, times), image
+
+
+_FROM_STATS = ("passes", "bytes_allocated", "bytes_without_aliasing", "bytes_without_culling", "lost_flux")
+
+
+def _row(case: Case, stats: Mapping[str, Any], times: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "scene": case.scene.name,
+        "tool": "glcaustics",
+        "method": case.method,
+        "quality": case.quality,
+        "pixels": case.pixels,
+        "options": stats["options"],
+        "overrides": dict(case.options),
+        "frames": case.frames,
+        **times,
+        **{name: stats[name] for name in _FROM_STATS},
+        "rays": sum(s["rays"] for s in stats["solves"]),
+        "backend": stats["backend"],
+        "gl_renderer": stats["renderer"],
+    }
 
 
 def picture(

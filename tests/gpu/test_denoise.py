@@ -12,7 +12,6 @@ from scipy.ndimage import binary_dilation, binary_erosion
 
 import glcaustics as glc
 from glcaustics.bench.targets import bench_scene
-from glcaustics.errors import UsageError
 from glcaustics.metrics import surface_flicker
 from glcaustics.scene.model import Camera, Scene
 from glcaustics.scene.water import Wave, WaveSurface, make_water
@@ -157,16 +156,3 @@ def test_no_bright_rim_along_edges_and_no_light_lost() -> None:
         print(photons, "photons: mean", filtered.mean() / truth.mean(), "rim / level:", along)
         assert filtered.mean() == pytest.approx(truth.mean(), rel=0.01)
         assert max(along.values()) < 1.15
-
-
-@pytest.mark.parametrize(
-    ("option", "value", "message"),
-    [
-        ("denoise_history", "none", "adaptive, exponential"),
-        ("history_frames", 0, "1 to 1024"),
-        ("denoise_passes", 9, "1 to 8"),
-    ],
-)
-def test_options_out_of_range(option: str, value: str | int, message: str) -> None:
-    with pytest.raises(UsageError, match=message):
-        open_renderer(wavy(0.0, 0.0), 1_000, **{option: value})

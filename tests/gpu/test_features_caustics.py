@@ -9,7 +9,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from glcaustics.errors import UsageError
 from glcaustics.optics.closed_form import (
     flat_directional_irradiance,
     flat_directional_shift_m,
@@ -270,21 +269,3 @@ def test_the_papers_flux_counts_the_cosine_twice() -> None:
         ratio = naive.sum() / exact.sum()
         print(f"{theta:g} degrees: naive / exact {ratio:.4f}, cos {math.cos(math.radians(theta)):.4f}")
         assert ratio == pytest.approx(math.cos(math.radians(theta)), rel=0.01)
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"estimate": "newton"},
-        {"caster_size": 4},
-        {"max_iterations": 0},
-        {"reflect": 3},
-        {"no_such_option": 1},
-        {"gather_taps": math.nan},
-    ],
-)
-def test_options_out_of_range_are_refused(options: dict[str, object]) -> None:
-    scene = scene_of([plane("floor", 3.0, -1.0), sheet("water", 0.8, 0.0)], [sun()], from_above(2.0, -1.0))
-    with pytest.raises(UsageError) as refused:
-        shoot(scene, (8, 8), options=options)
-    assert "\n" not in str(refused.value) and next(iter(options)) in str(refused.value)
