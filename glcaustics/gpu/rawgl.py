@@ -22,19 +22,13 @@ _PTR = ctypes.c_void_p
 
 #: name -> (result, arguments); all of OpenGL 3.3 core.
 _SIGNATURES: dict[str, tuple[Any, ...]] = {
-    "glGetError": (_UINT,),
     "glGetIntegerv": (None, _UINT, _PTR),
-    "glGetIntegeri_v": (None, _UINT, _UINT, _PTR),
     "glGetFloatv": (None, _UINT, _PTR),
     "glGetDoublev": (None, _UINT, _PTR),
-    "glGetBooleanv": (None, _UINT, _PTR),
     "glGetBooleani_v": (None, _UINT, _UINT, _PTR),
     "glIsEnabled": (_BOOL, _UINT),
     "glEnable": (None, _UINT),
     "glDisable": (None, _UINT),
-    "glIsEnabledi": (_BOOL, _UINT, _UINT),
-    "glEnablei": (None, _UINT, _UINT),
-    "glDisablei": (None, _UINT, _UINT),
     "glBindFramebuffer": (None, _UINT, _UINT),
     "glBindRenderbuffer": (None, _UINT, _UINT),
     "glBindBuffer": (None, _UINT, _UINT),
@@ -72,7 +66,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {
 
 
 class RawGL:
-    """Calls OpenGL by name: `raw.glEnable(0x0BE2)`. Entry points are looked up once, when first used.
+    """Calls OpenGL by name: `raw.glEnable(gl_enums.BLEND)`. Entry points are looked up once, when first used.
 
     Args:
         ctx: a moderngl context, current.
