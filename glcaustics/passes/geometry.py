@@ -230,11 +230,12 @@ class GpuScene:
         if self._touch_version != self.version:
             self._touch_version, self._touches = self.version, {}
         if key not in self._touches:
-            pairs = ((a, b) for a in self.select(one) for b in self.select(*others) if a is not b)
-            self._touches[key] = any(
-                bool((a.bounds_ws[0] <= b.bounds_ws[1]).all() and (b.bounds_ws[0] <= a.bounds_ws[1]).all())
-                for a, b in pairs
-            )
+            ones, rest = self.select(one), self.select(*others)
+            a = np.reshape([item.bounds_ws for item in ones], (-1, 1, 2, 3))
+            b = np.reshape([item.bounds_ws for item in rest], (1, -1, 2, 3))
+            meet = np.all((a[..., 0, :] <= b[..., 1, :]) & (b[..., 0, :] <= a[..., 1, :]), axis=-1)
+            same = np.reshape([i.index for i in ones], (-1, 1)) == np.reshape([i.index for i in rest], (1, -1))
+            self._touches[key] = bool(np.any(meet & ~same))
         return self._touches[key]
 
     def draw(

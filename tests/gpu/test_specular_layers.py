@@ -94,6 +94,14 @@ class Path:
         self.d = self.d - 2.0 * (self.d @ n)[..., None] * n
 
 
+def through(path: Path, n: FloatArray, front: float, back: float) -> None:
+    """A pane of green glass in air."""
+    path.to_plane(n, front)
+    path.refract(n, 1.0, N_GLASS)
+    path.to_plane(n, back, GREEN.sigma_a)
+    path.refract(n, N_GLASS, 1.0)
+
+
 def compare(frame: Frame, camera: Camera, path: Path, where: BoolArray) -> tuple[FloatArray, FloatArray]:
     """Over the pixels `where`: how far off the solved hits are, pixels; and radiance over that of the glowing floor."""
     px = project(camera, path.p)
@@ -250,22 +258,24 @@ def test_a_ball_in_a_block_of_water() -> None:
     np.testing.assert_allclose(np.percentile(ratio, (2, 50, 98)), 1.0, rtol=0.01)
 
 
-def test_a_mirror_behind_a_pane() -> None:
-    """The floor between pane and mirror, seen in the mirror through the pane."""
-    camera = Camera.look_at((0.6, 0.7, 3.2), (0.0, -0.4, -1.0), yfov_rad=0.8)
-    pane = box("pane", (4.0, 4.0, 0.3), (0.0, 0.0, 1.5), GREEN)
+@pytest.mark.parametrize("before_the_pane", [False, True])
+def test_a_mirror_behind_a_pane(before_the_pane: bool) -> None:
+    """The floor, seen in the mirror through the pane: between the two, or through the pane once more."""
+    eye_z, pane_z = (6.0, 0.0) if before_the_pane else (3.2, 1.5)
+    camera = Camera.look_at((0.6, 0.7, eye_z), (0.0, -0.4, -1.0), yfov_rad=0.8)
+    pane = box("pane", (4.0, 4.0, 0.3), (0.0, 0.0, pane_z), GREEN)
     mirror = box("mirror", (3.0, 3.0, 0.1), (0.0, 0.4, -1.05), MIRROR)
     scene = scene_of([plane("floor", 8.0, -1.0, GLOW), pane, mirror], [sun(0.0, 1e-3)], camera, sky=BLACK)
     frame, path = look(scene), Path(camera)
-    path.to_plane(Z, 1.65)
-    path.refract(Z, 1.0, N_GLASS)
-    path.to_plane(Z, 1.35, GREEN.sigma_a)
-    path.refract(Z, N_GLASS, 1.0)
+    through(path, Z, pane_z + 0.15, pane_z - 0.15)
     path.to_plane(Z, -1.0)
     shown = (np.abs(path.p[..., 0]) < 1.4) & (path.p[..., 1] > -0.9)
     path.reflect(Z)
+    if before_the_pane:
+        through(path, Z, pane_z - 0.15, pane_z + 0.15)
     path.to_plane(Y, -1.0)
-    off, ratio = compare(frame, camera, path, shown & path.alive & (path.p[..., 2] < 1.2))
+    shown &= path.alive & (path.p[..., 2] > 0.5 if before_the_pane else path.p[..., 2] < 1.2)
+    off, ratio = compare(frame, camera, path, shown)
     assert np.percentile(off, 99) < 0.1
     np.testing.assert_allclose(np.percentile(ratio, (1, 50, 99)), 1.0, rtol=5e-3)
 

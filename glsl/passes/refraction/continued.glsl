@@ -71,24 +71,64 @@ struct Upward {
     bool met;            // it came up to the first surface
     bool over;           // and left the medium there
     float way_m;         // to there
-    float carries;
+    vec3 carries;
 };
 
-// Whether a mirrored ray comes up to the first surface before it has met anything: `ray` goes on over it then, or is reflected down.
+#if HAS_SOLID
+// Where a mirrored ray comes back through the first surface's solid, a window before a mirror: in by the far side, out by the near one.
+// Moves p and d to the way out; false where it passes beside that.
+bool back_through_first(inout vec3 p, inout vec3 d, float around_ior, out float t, out vec3 carries) {
+    t = 0.0;
+    carries = vec3(1.0);
+    float own = texelFetch(t_first_normal, ivec2(gl_FragCoord.xy), 0).w;
+    GlcRasterRay ray = eye_ray(p, d);
+    GlcSolve far = glc_newton(t_first_back_plane, ray, -1.0, SURFACE_ITERATIONS);
+    vec4 stored = texelFetch(t_first_back_normal, ivec2(far.texel), 0);
+    GlcObject object = glc_object(int(abs(own) + 0.5) - 1);
+    if (own == 0.0 || object.kind != GLC_SOLID || far.status != GLC_SOLVE_HIT || abs(stored.w) != abs(own)) return false;
+    t = glc_raster_distance(ray, far.u);
+    vec3 n = dot(stored.xyz, d) > 0.0 ? -stored.xyz : stored.xyz, inside, onward;
+    float eta = object.ior.g / around_ior;
+    glc_refract(d, n, eta, inside);
+    vec3 entry = p + t * d;
+    ray = eye_ray(entry, inside);
+    GlcSolve near = glc_newton(t_first_plane, ray, -1.0, SURFACE_ITERATIONS);
+    vec4 front = texelFetch(t_first_normal, ivec2(near.texel), 0);
+    vec3 m = dot(front.xyz, inside) > 0.0 ? -front.xyz : front.xyz;
+    if (near.status != GLC_SOLVE_HIT || front.w != own || !glc_refract(inside, m, 1.0 / eta, onward)) return false;
+    float inside_m = glc_raster_distance(ray, near.u);
+    carries = object.transmission * glc_transmittance(object.sigma_a, inside_m);
+    carries *= (1.0 - glc_fresnel_dielectric(-dot(n, d), eta)) * (1.0 - glc_fresnel_dielectric(-dot(m, inside), 1.0 / eta));
+    p = entry + inside_m * inside;
+    d = onward;
+    return true;
+}
+#endif
+
+// Whether a mirrored ray comes up to the first surface before it has met anything: `ray` goes on beyond it then, or is reflected down.
 // Else `found` is what it shows, and distance_m what of its way lies in the medium.
 bool comes_up(Surface at, inout Seen found, inout Upward upward, inout GlcRasterRay ray, inout vec3 d) {
     float medium = texelFetch(t_point, ivec2(gl_FragCoord.xy), 0).w, t;
     vec3 n, onward;
     bool meets = found.status == GLC_VIEW_MARCHED || found.status == GLC_VIEW_SECOND;
     bool rises = !upward.met && first_surface(at.p, d, medium, n, t) && !(meets && found.distance_m <= t);
+#if HAS_SOLID
+    vec3 p = at.p, back = d, carries;
+    if (!upward.met && medium <= 0.0 && back_through_first(p, back, at.before.ior, t, carries) && !(meets && found.distance_m <= t)) {
+        upward = Upward(true, false, t, carries);
+        d = back;
+        ray = eye_ray(p, d);
+        return true;
+    }
+#endif
     if (!rises) {
         found.radiance *= upward.carries;
         found.distance_m = upward.way_m + (upward.over ? 0.0 : found.distance_m);
         return false;
     }
-    upward = Upward(true, glc_refract(d, n, 1.0 / at.before.ior, onward), t, 1.0);
+    upward = Upward(true, glc_refract(d, n, 1.0 / at.before.ior, onward), t, vec3(1.0));
     // Radiance below is larger by n^2.
-    if (upward.over) upward.carries = at.before.ior * at.before.ior * (1.0 - glc_fresnel_dielectric(-dot(n, d), 1.0 / at.before.ior));
+    if (upward.over) upward.carries *= at.before.ior * at.before.ior * (1.0 - glc_fresnel_dielectric(-dot(n, d), 1.0 / at.before.ior));
     ray = eye_ray(at.p + t * d, onward);
     d = onward;
     return true;

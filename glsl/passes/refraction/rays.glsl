@@ -133,7 +133,7 @@ void look_everywhere(Surface at, Rays rays, inout Seen seen, inout vec3 reflecti
     if (refracted) ray = rays.ray;
     reflection_m = 0.0;
 #if CONTINUED
-    Upward upward = Upward(false, false, 0.0, 1.0);
+    Upward upward = Upward(false, false, 0.0, vec3(1.0));
 #endif
     for (;;) {
         Seen found = look_along(ray, at.p, refracted ? rays.d : mirror_d, !refracted);

@@ -3,6 +3,10 @@
 uniform sampler2D t_front_plane;
 uniform sampler2D t_back_plane;
 uniform sampler2D t_back_normal;
+#if CONTINUED
+uniform sampler2D t_first_back_plane;    // of the first layer, where the others are the second one's
+uniform sampler2D t_first_back_normal;
+#endif
 #if EXITS_UNDER
 uniform sampler2D t_behind_plane;
 uniform sampler2D t_behind_normal;
@@ -77,9 +81,6 @@ float interface_over(vec3 p) {
 #endif
 
 #if CONTINUED && NESTED
-uniform sampler2D t_first_back_plane;
-uniform sampler2D t_first_back_normal;
-
 // Whether a point within the first surface's solid, or behind that, lies within: a liquid leaves its glass where it ends.
 bool within_first(vec3 p) {
     vec4 q = u_raster_from_world * vec4(p, 1.0);
