@@ -45,7 +45,7 @@ HELP: Mapping[str, str] = {
     "max_iterations": "of the intersection estimate in the light's view (1..64)",
     "march_steps": "of the march in the light's view where the estimate fails (1..512)",
     "view_steps": "of the march in the camera's view, and of reflected photons in the light's (8..16384)",
-    "march": "in the camera's view: hierarchical, or dda: pixel by pixel, the paper's, as a baseline",
+    "march": "hierarchical, or dda: pixel by pixel in both views, the paper's, as a baseline",
     "internal_bounces": "total reflections followed inside a solid (0..32)",
     "fresnel": "split: every photon is refracted and reflected, weighted; chance: one of both, drawn",
     "adaptive": "more photons start where the last frames' photons showed in the picture (true, false)",

@@ -15,16 +15,18 @@ from typing import Any, ClassVar
 import numpy as np
 
 from glcaustics.caustics import photon_options, photon_strata
-from glcaustics.caustics.branches import BRANCH_CODE, REFLECT, SOLID, Branch, branches_of
+from glcaustics.caustics.branches import BRANCH_CODE, INTERFACE, REFLECT, SOLID, Branch, branches_of
 from glcaustics.caustics.method import IRRADIANCE, NOISY_IRRADIANCE, CausticsMethod
 from glcaustics.caustics.photon_stats import landing_of, photon_statistics
 from glcaustics.caustics.photon_strata import photon_grid, sequence
+from glcaustics.gpu import Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes import depth_chain, light_view
 from glcaustics.passes.context import PassContext
 from glcaustics.passes.frame import FrameSetup, LightSetup
 from glcaustics.passes.light_views import light_uniforms
 from glcaustics.passes.raster import raster_uniforms
+from glcaustics.passes.receiver_views import ReceiverView
 from glcaustics.passes.runner import PlanRunner
 from glcaustics.scene.model import Instance, OpticalKind
 
@@ -94,6 +96,9 @@ class PhotonTrace(CausticsMethod):
                 light_view.declare_receiver(graph, setup, light, receiver)
             if any(branch.view == receiver.name and branch.kind == REFLECT for branch in branches):
                 plane = light.resource(f"receiver.{receiver.name}.plane")
+                if setup.options["march"] == "dda":
+                    _declare_light_depth(graph, light, receiver, plane)
+                    continue
                 depth_chain.declare_over(
                     graph, f"depth_chain.{receiver.name}", plane, receiver.view.size, light.resource("")
                 )
@@ -105,6 +110,7 @@ class PhotonTrace(CausticsMethod):
     def _declare_trace(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, branch: Branch) -> None:
         assert light.caster is not None
         size = photon_grid(int(setup.options["photons"]), light.caster)
+        mask = [branch.resource("landing_mask")] if in_stages(setup, branch) else []
         back = (light.resource("caster.back_position_ws"), light.resource("caster.back_normal_ws"))
         graph.add(
             PassDecl(
@@ -112,17 +118,19 @@ class PhotonTrace(CausticsMethod):
                 {
                     landing_of(branch): TextureDesc("rgba32f", size, "px"),
                     branch.flux: TextureDesc("rgba32f", size, "lm"),
+                    **{name: TextureDesc("depth24", size) for name in mask},
                 },
                 lambda ctx: self._trace(ctx, light, branch),
                 reads=(
                     light.resource("caster.position_ws"),
                     light.resource("caster.normal_ws"),
-                    *_light_reads(light, branch).values(),
+                    *_light_reads(light, branch, setup.options["march"]).values(),
                     "gbuffer.plane",
                     *_march_reads(setup).values(),
                     *(back if branch.kind == SOLID else ()),
                     *((photon_strata.strata_of(branch),) if photon_strata.is_adaptive(setup.options) else ()),
                 ),
+                always_writes=tuple(mask),
                 note=f"where {branch.words} photons land",
                 view_dependent=True,
             )
@@ -131,6 +139,17 @@ class PhotonTrace(CausticsMethod):
     # -- execution ----------------------------------------------------------------------------------------------------
 
     def _trace(self, ctx: PassContext, light: LightSetup, branch: Branch) -> None:
+        """In one stage, or in two: few refracted photons are marched, and where lanes wait, all would pay for them."""
+        outputs = (landing_of(branch), branch.flux)
+        if not in_stages(ctx.setup, branch):
+            ctx.device.draw_fullscreen(self._program(ctx, light, branch, first=False), ctx.target(*outputs))
+            return
+        target = ctx.target(*outputs, depth=branch.resource("landing_mask"))
+        first = self._program(ctx, light, branch, first=True)
+        ctx.device.draw_fullscreen(first, target, depth_func="1", depth_write=True)
+        ctx.device.draw_fullscreen(self._program(ctx, light, branch, first=False), target, depth_func="<")
+
+    def _program(self, ctx: PassContext, light: LightSetup, branch: Branch, first: bool) -> Program:
         assert light.caster is not None
         view = light.receivers[branch.view].view
         options = ctx.setup.options
@@ -138,6 +157,7 @@ class PhotonTrace(CausticsMethod):
             "CASTER_FACES": light.caster.faces,
             "RECEIVER_FACES": view.faces,
             "BRANCH": BRANCH_CODE[branch.kind],
+            "FIRST": int(first),
             "CHANCE": int(options["fresnel"] == "chance"),
             "ADAPTIVE": int(photon_strata.is_adaptive(options)),
             "BLOCKS": photon_strata.BLOCKS,
@@ -154,6 +174,7 @@ class PhotonTrace(CausticsMethod):
         if photon_strata.is_adaptive(options):
             program.set(t_strata=ctx.texture(photon_strata.strata_of(branch)))
         low, high = ctx.setup.bounds_ws
+        light_reads = _light_reads(light, branch, options["march"])
         program.set_all(
             {
                 **ctx.frame.camera.uniforms(),
@@ -165,7 +186,7 @@ class PhotonTrace(CausticsMethod):
                 "t_caster_normal": ctx.texture(light.resource("caster.normal_ws")),
                 "t_plane": ctx.texture("gbuffer.plane"),
                 **{name: ctx.texture(resource) for name, resource in _march_reads(ctx.setup).items()},
-                **{name: ctx.texture(resource) for name, resource in _light_reads(light, branch).items()},
+                **{name: ctx.texture(resource) for name, resource in light_reads.items()},
                 "t_objects": ctx.frame.gpu.objects,
                 "u_photon_grid": photon_grid(int(options["photons"]), light.caster),
                 "u_sequence": sequence(ctx.frame.index),
@@ -182,7 +203,7 @@ class PhotonTrace(CausticsMethod):
                 "u_roughness_cutoff": float(options["roughness_cutoff"]),
             }
         )
-        ctx.device.draw_fullscreen(program, ctx.target(landing_of(branch), branch.flux))
+        return program
 
     @staticmethod
     def _solid_uniforms(ctx: PassContext, light: LightSetup) -> dict[str, Any]:
@@ -227,14 +248,41 @@ def _march_reads(setup: FrameSetup) -> dict[str, str]:
     return {"t_bounds": "depth_chain.bounds"}
 
 
-def _light_reads(light: LightSetup, branch: Branch) -> dict[str, str]:
+def _light_reads(light: LightSetup, branch: Branch, march: str) -> dict[str, str]:
     """Samplers and resources of the way through the light's view."""
     receiver = f"receiver.{branch.view}"
+    if branch.kind == REFLECT and march == "dda":
+        depth = light.resource(f"{receiver}.depth_m")
+        return {"t_light_plane": light.resource(f"{receiver}.plane"), "t_light_depth_m": depth}
     if branch.kind == REFLECT:
         bounds = light.resource(f"depth_chain.{branch.view}.bounds")
         return {"t_light_plane": light.resource(f"{receiver}.plane"), "t_light_bounds": bounds}
     position, normal = (light.resource(f"{receiver}.{name}") for name in ("position_ws", "normal_ws"))
     return {"t_receiver_position": position, "t_receiver_normal": normal}
+
+
+def in_stages(setup: FrameSetup, branch: Branch) -> bool:
+    """Whether photons that the first estimate does not settle have a pass of their own: where these are few."""
+    return branch.kind == INTERFACE and not has_rough_casters(setup.instances())
+
+
+def _declare_light_depth(graph: FrameGraph, light: LightSetup, receiver: ReceiverView, plane: str) -> None:
+    """A texture of depths beside that of planes, which the march pixel by pixel would read four times as much of."""
+    depth = light.resource(f"receiver.{receiver.name}.depth_m")
+    graph.add(
+        PassDecl(
+            f"receiver_view.depth_m.{receiver.name}{light.resource('')}",
+            {depth: TextureDesc("r32f", receiver.view.size, "m")},
+            lambda ctx: _draw_light_depth(ctx, plane, depth),
+            reads=(plane,),
+            note="depth of the light's view, for the march pixel by pixel",
+        )
+    )
+
+
+def _draw_light_depth(ctx: PassContext, plane: str, depth: str) -> None:
+    program = ctx.device.program(f"{SHADERS}/light_depth").set(t_plane=ctx.texture(plane))
+    ctx.device.draw_fullscreen(program, ctx.target(depth))
 
 
 def has_rough_casters(instances: Iterable[Instance]) -> bool:

@@ -17,6 +17,7 @@ uniform int u_view_steps;
 #define PHOTON_HIDDEN -2         // behind what the light sees, and not found by the eye
 #define PHOTON_UNRESOLVED -3
 #define PHOTON_LEFT -8
+#define PHOTON_TODO -99          // of the first stage: marched by the second
 #define PHOTON_UNSEEN -9         // lands where the eye looks, behind something
 #define PHOTON_OUTSIDE -10       // lands outside of the picture
 
@@ -174,6 +175,10 @@ PhotonLanding photon_land(vec3 o, vec3 d, GlcHit hit, float slack_m, float t_max
     PhotonLanding landing = PhotonLanding(vec2(0.0), 0.0, hit.t, 0, 0, vec4(0.0), 0.0);
     bool found = hit.status > 0;
     if (found && photon_refine(o, d, hit, slack_m, landing)) return landing;
+#if FIRST
+    landing.status = PHOTON_TODO;
+    return landing;
+#endif
     float clear;
     photon_march(o, d, found ? max(hit.t - 4.0 * slack_m, 0.0) : 0.0, t_max, landing, clear);
     if (landing.status <= 0 && !found) photon_give_up(hit, landing);

@@ -5,7 +5,11 @@
 #include "interface/receiver_view.glsl"
 
 uniform sampler2D t_light_plane;      // of the receivers' view, in its raster space
+#if DDA
+uniform sampler2D t_light_depth_m;
+#else
 uniform sampler2D t_light_bounds;
+#endif
 uniform mat4 u_receiver_raster_from_world;   // of a single frustum; cube faces make their own
 
 // Raster space of the face of the receivers' view that sees p: see common/raster_ray.glsl; xy within the face.
@@ -21,7 +25,7 @@ mat4 photon_face_raster(GlcView view, vec2 face_size, vec3 p) {
 #endif
 }
 
-// Where the ray meets what the light sees, by a march over depth bounds: no surface is stepped over, however thin.
+// Where the ray meets what the light sees, from t on: no surface is stepped over, however thin.
 GlcHit photon_march_light(GlcView view, vec3 o, vec3 d, float t, float t_max) {
     GlcHit hit = GlcHit(0.0, o, -d, 0, GLC_LEFT);
 #if RECEIVER_FACES == 1
@@ -45,7 +49,11 @@ GlcHit photon_march_light(GlcView view, vec3 o, vec3 d, float t, float t_max) {
         corner = vec2(face % 3, face / 3) * face_size;
         ray.start.xy += corner;
 #endif
+#if DDA
+        GlcSolve solve = glc_march_dda(t_light_depth_m, t_light_plane, orthographic, ray, u_view_steps);
+#else
         GlcSolve solve = glc_march_hierarchical(t_light_bounds, t_light_plane, ray, u_view_steps);
+#endif
         hit.iterations += solve.iterations;
         hit.status = solve.status == GLC_SOLVE_HIDDEN ? GLC_HIDDEN : (solve.status == GLC_SOLVE_DIVERGED ? GLC_UNCONVERGED : GLC_LEFT);
         if (solve.status != GLC_SOLVE_HIT) continue;

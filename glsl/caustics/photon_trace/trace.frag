@@ -2,6 +2,7 @@
 // sees of a specular surface, is refracted or reflected, and followed through the light's view, then through the camera's.
 // BRANCH: GLC_REFLECT, GLC_THROUGH (an open interface) or GLC_IN_AND_OUT (a solid's two). CHANCE 1: Fresnel's equations decide which of
 // the branches a photon takes (theirs); 0: every photon takes all, weighted: less noise for more work.
+// FIRST 1: only what the first estimate settles; the others are left to a second stage by a depth mask.
 #define GLC_REFLECT 0
 #define GLC_THROUGH 1
 #define GLC_IN_AND_OUT 2
@@ -65,9 +66,7 @@ void split(GlcObject object, float n_dot_l, float eta, out vec3 reflected, out f
     transmitted = mirror ? 0.0 : (1.0 - r) * object.transmission;
 }
 
-void main() {
-    o_landing = vec4(0.0);
-    o_flux = vec4(0.0);
+void trace() {
     uvec2 cell = uvec2(gl_FragCoord.xy);
     vec3 xi = glc_stratum_point(cell, u_seed, u_sequence);
     GlcView caster_view = glc_caster_view();
@@ -164,7 +163,7 @@ void main() {
 #else
     GlcView receiver_view = glc_receiver_view();
     GlcHit hit = glc_intersect(t_receiver_position, t_receiver_normal, receiver_view, p, ray, t_max, ESTIMATE, u_max_iterations,
-                               u_march_steps);
+                               FIRST == 1 ? 0 : u_march_steps);
     float slack_m = 0.5 * glc_texel_width(receiver_view, hit.status > 0 ? hit.position_ws : p);
     PhotonLanding landing = photon_land(p, ray, hit, slack_m, t_max);
     iterations += float(hit.iterations);
@@ -182,4 +181,13 @@ void main() {
     if (in_absorber && landing.status > 0) flux *= glc_transmittance(object.sigma_a, landing.t);
     o_landing = vec4(landing.px, landing.per_m2, float(landing.status));
     o_flux = vec4(flux, iterations);
+}
+
+void main() {
+    o_landing = vec4(0.0);
+    o_flux = vec4(0.0);
+    trace();
+#if FIRST
+    gl_FragDepth = o_landing.w == float(PHOTON_TODO) ? 1.0 : 0.0;
+#endif
 }
