@@ -5,14 +5,18 @@ uniform sampler2D t_difference;
 uniform sampler2D t_noise;
 uniform sampler2D t_doubt;
 
-// A mean of squares is known to its standard error, which a few bright pixels may make as large as the mean: so many of them are put down to
-// noise. How many times its expectation is for the one difference of the mean of 9 blocks, which has no such error; how many times the
-// resampling's doubt is.
-const float STANDARD_ERRORS = 1.0, MEAN = 7.0, DOUBT = 4.0;
+// How many times its expectation the one difference of the mean of 9 blocks must be, and how many times the resampling's doubt is put down to
+// noise, so that it seldom is taken for a change.
+const float MEAN = 7.0, DOUBT = 4.0;
 // An error that neighbours share passes the filter over space, noise does not: it counts as much more as that takes of the noise, about.
 const float GAIN = 16.0;
 
 layout(location = 0) out float o_change;    // squared error of the history by the change / variance of a frame's pixel
+
+// A mean of squares is known to its standard error, and a few bright pixels make that as large as the mean.
+float significant(float excess, float standard_error) {
+    return excess * smoothstep(1.5, 2.5, excess / max(standard_error, 1e-30));
+}
 
 void main() {
     o_change = 0.0;
@@ -45,9 +49,9 @@ void main() {
     one = max(one, 1e-4 * difference.y / difference.w);
     float both = one * (1.0 + difference.z / difference.w);    // of new - old, if the light stands still
     // Besides: what resampling alone may have done, by pixels and by what their errors have in common.
-    float by_pixels = difference.y / difference.w - both - (STANDARD_ERRORS * error.x + DOUBT * doubt.y) / difference.w;
+    float by_pixels = significant((difference.y - DOUBT * doubt.y) / difference.w - both, error.x / difference.w);
     // Of means, in units of a pixel's variance.
-    float by_blocks = blocks.x / blocks.y - both - (STANDARD_ERRORS * error.y + DOUBT * blocks.z) / blocks.y;
+    float by_blocks = significant((blocks.x - DOUBT * blocks.z) / blocks.y - both, error.y / blocks.y);
     float by_mean = near.w > 8.0 ? near.x * near.x / near.w - MEAN * both - DOUBT * near_doubt * near_doubt / near.w : 0.0;
     float change = max(max(by_pixels, by_blocks), max(by_mean, 0.0)) * GAIN / one;
     o_change = change < 1e6 ? change : 1e6;     // also for NaN
