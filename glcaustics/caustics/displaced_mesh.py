@@ -22,7 +22,7 @@ from glcaustics.passes.runner import PlanRunner
 
 SHADERS = "caustics/displaced_mesh"
 FACED_STAGES = ("vertex", "cell", "mesh")  # which carry vertices over to another face of a cube
-WARPED_STAGES = ("vertex", "leftover")
+WARPED_STAGES = ("vertex", "cell", "leftover")
 
 
 class DisplacedMesh(LightMapMethod):
@@ -130,7 +130,7 @@ class DisplacedMesh(LightMapMethod):
         add(
             "cell",
             (cell, weight),
-            (projected, vertex, landing),
+            (projected, vertex, landing, *warp),
             "1/texel^2",
             "which cells are drawn, and their densities",
         )

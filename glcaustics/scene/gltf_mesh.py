@@ -24,6 +24,7 @@ from glcaustics.scene.model import (
 
 TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN = 4, 5, 6
 CLOSED_LOOK = 0.75  # `mesh_tools.enclosure` above which an open transmissive mesh was surely meant as a solid
+MENDED_AREA, MENDED_EDGES = 0.02, 0.02  # shares of the surface that may lack, or face the wrong way, in a solid
 AGAIN = "export the file again"
 
 
@@ -170,8 +171,9 @@ class MeshReader:
         labels = mesh_tools.weld(raw.positions_m)
         topology = mesh_tools.topology(raw.positions_m, raw.triangles, labels)
         transmissive = is_transmissive(material.material)
-        if transmissive and not topology.watertight:
-            self._announce_open(name, raw, topology, material.thickness)
+        closed = topology.watertight
+        if transmissive and not closed:
+            closed = self._all_but_closed(name, raw, topology, material.thickness)
         kept = mesh_tools.nondegenerate(raw.positions_m, raw.triangles)
         if not kept.any():
             self._file.announce(f"mesh '{name}' has no area and is not drawn")
@@ -179,7 +181,7 @@ class MeshReader:
         if not kept.all():
             self._file.announce(f"mesh '{name}': {int((~kept).sum())} degenerate triangles removed")
             raw = replace(raw, triangles=raw.triangles[kept])
-        raw = self._wound(name, raw, labels, solid=transmissive and topology.watertight)
+        raw = self._wound(name, raw, labels, solid=transmissive and closed)
         if raw.normals is None:
             smooth = transmissive or is_mirror(material.material)
             split = (
@@ -195,18 +197,25 @@ class MeshReader:
             normals=raw.normals.astype(np.float32),
             uv=raw.uv.astype(np.float32),
             triangles=raw.triangles.astype(np.uint32),
-            watertight=topology.watertight,
+            watertight=closed,
         )
 
-    def _announce_open(self, name: str, raw: _Raw, topology: mesh_tools.Topology, thickness: float) -> None:
-        if thickness <= 0.0 and mesh_tools.enclosure(raw.positions_m, raw.triangles) < CLOSED_LOOK:
-            return  # a sheet, such as water, and meant as one
+    def _all_but_closed(self, name: str, raw: _Raw, topology: mesh_tools.Topology, thickness: float) -> bool:
+        """Whether an open transmissive mesh is taken as a solid; announced, but for sheets meant as such."""
+        enclosure = mesh_tools.enclosure(raw.positions_m, raw.triangles)
+        if thickness <= 0.0 and enclosure < CLOSED_LOOK:
+            return False  # such as water
         if topology.open_edges:
             why = f"has {topology.open_edges} open edges"
         else:
             why = f"has {topology.miswound_edges} edges between triangles that face opposite ways"
+        few = topology.open_edges + topology.miswound_edges <= MENDED_EDGES * 3 * len(raw.triangles) + 3
+        closed = enclosure > 1.0 - MENDED_AREA and few
         what = f"mesh '{name}' transmits but is not watertight ({why})"
-        self._file.announce(f"{what}; it is treated as a single interface")
+        self._file.announce(
+            f"{what}; it is treated as a {'solid, being all but closed' if closed else 'single interface'}"
+        )
+        return closed
 
     def _wound(self, name: str, raw: _Raw, labels: IntArray, *, solid: bool) -> _Raw:
         """Normals made unit, and triangles wound counter-clockwise from outside.

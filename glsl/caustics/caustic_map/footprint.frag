@@ -94,21 +94,19 @@ void main() {
     vec3 c = axis_covariance(view, centre, face, here, caster.w, texel, ivec2(1, 0), spread * spread)
            + axis_covariance(view, centre, face, here, caster.w, texel, ivec2(0, 1), spread * spread);
     c *= u_sigma * u_sigma;
-#if CORES > 0
     float half_trace = 0.5 * (c.x + c.z);
-    int tier = tier_of(here.xyz, half_trace + sqrt(max(half_trace * half_trace - (c.x * c.z - c.y * c.y), 0.0)));
+    float largest = half_trace + sqrt(max(half_trace * half_trace - (c.x * c.z - c.y * c.y), 0.0));
+#if CORES > 0
+    int tier = tier_of(here.xyz, largest);
     if (tier > 0) { o_splat.w = float(tier); return; }
 #endif
-    c += vec3(GLC_PIXEL_VARIANCE, 0.0, GLC_PIXEL_VARIANCE);
-    float mean = 0.5 * (c.x + c.z);
-    float largest = mean + sqrt(max(mean * mean - (c.x * c.z - c.y * c.y), 0.0));
-    float radius = sqrt(GLC_CUTOFF * largest);
-    // A splat wider than the limit keeps its flux and its shape, not its size.
-    float shrink = min(1.0, u_max_radius / radius);
-    c *= shrink * shrink;
-    float det = max(c.x * c.z - c.y * c.y, 1e-8);
+    // A splat that is too wide keeps its flux and its shape; never does it get narrower than the map's own filter.
+    float most = max(u_max_radius * u_max_radius / GLC_CUTOFF - GLC_PIXEL_VARIANCE, 0.0);
+    c = c * min(1.0, most / max(largest, 1e-30)) + vec3(GLC_PIXEL_VARIANCE, 0.0, GLC_PIXEL_VARIANCE);
+    float radius = sqrt(GLC_CUTOFF * (min(largest, most) + GLC_PIXEL_VARIANCE));
+    float det = max(c.x * c.z - c.y * c.y, GLC_PIXEL_VARIANCE * GLC_PIXEL_VARIANCE);
     // Integral of exp(-q/2) - exp(-Q/2) over q < Q.
     float integral = 2.0 * GLC_PI * sqrt(det) * (1.0 - exp(-0.5 * GLC_CUTOFF) * (1.0 + 0.5 * GLC_CUTOFF));
-    o_splat = vec4(centre.xy, radius * shrink, float(face));
+    o_splat = vec4(centre.xy, radius, float(face));
     o_conic = vec4(c.z / det, -c.y / det, c.x / det, 1.0 / integral);
 }

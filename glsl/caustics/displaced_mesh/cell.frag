@@ -1,6 +1,9 @@
 // One fragment a cell between four vertices: is it drawn as two triangles, and with what densities? A cell that is not (an edge
 // runs through it, or a fold that the map's texels cannot resolve) leaves its four vertices' flux to leftover.frag.
 #include "caustics/displaced_mesh/grid.glsl"
+#if WARP
+#include "interface/map_warp.glsl"
+#endif
 
 uniform sampler2D t_vertex;
 uniform float u_fold_width;  // texels: a cell wider than this is drawn in any case
@@ -20,14 +23,16 @@ float signed_area(vec3 a, vec3 b, vec3 c) { return 0.5 * cross2(b.xy - a.xy, c.x
 // flux exactly (quadrature of degree 3 over a triangle: Zienkiewicz 1971, table 8.2).
 // `side`: of the triangle as it is drawn. A sliver can lie the wrong way round though its sheet does not fold, since its edges are
 // chords: its neighbours then overlap, and drawn as less than nothing it takes off what they have too much.
-// `drawn` gathers the share of the flux that is drawn then.
-vec2 densities(vec3 a, vec3 b, vec3 c, float side, inout float drawn) {
+// `area`: that it covers as it is drawn, its edges straight in the map, texels^2 of the view; of a long narrow one in a warped map far
+// more than its landing points span. `drawn` gathers the share of the flux that is drawn then.
+vec2 densities(vec3 a, vec3 b, vec3 c, float side, float area, inout float drawn) {
     vec3 det = vec3(a.z, b.z, c.z);
     float low = min(det.x, min(det.y, det.z)), high = max(det.x, max(det.y, det.z));
     // Where the determinant hardly changes, 1/|det| is more exact than the triangle's area.
     float smallest = low * high > 0.0 ? min(abs(low), abs(high)) : 0.0;
     float uneven = smoothstep(2.0, 6.0, max(abs(low), abs(high)) / max(smallest, 1e-12));
-    float ratio = 0.5 / max(abs(signed_area(a, b, c)), 1e-6);
+    float spanned = max(abs(signed_area(a, b, c)), 1e-6);
+    float ratio = 0.5 / mix(spanned, max(area, spanned), smoothstep(1.5, 3.0, area / spanned));
     float cap = DENSITY_CAP * ratio / max(uneven, 1e-3);
     float mean = 0.0;
     for (int i = 0; i < 3; ++i) {
@@ -78,7 +83,16 @@ float resolved_share(ivec2 texel, vec3 a, vec3 b, vec3 c, vec3 d) {
     return folds_ahead(texel, slope, 0.25 * (a.z + b.z + c.z + d.z)) ? share : 1.0;
 }
 
-float side(vec3 a, vec3 b, vec3 c) { return sign(signed_area(a, b, c)); }
+// Area of a triangle of the map (a, b, c) in texels^2 of the view; `middle`: of its corners there.
+float drawn_area(vec3 a, vec3 b, vec3 c, vec2 middle) {
+    float area = abs(signed_area(a, b, c));
+#if WARP
+    vec2 rate;
+    warp(middle, u_receiver_size, rate);
+    area /= rate.x * rate.y;
+#endif
+    return area;
+}
 
 // Position and determinant of a vertex on the face of the cell's first one.
 vec3 corner(ivec2 texel, vec4 vertex, int face) {
@@ -104,7 +118,7 @@ void main() {
 #endif
     o_weight.x = resolved_share(texel, a, b, c, d);
     if (o_weight.x == 0.0) return;
-    vec2 sides = vec2(side(a, b, c), side(b, d, c));
+    vec3 map_a = a, map_b = b, map_c = c, map_d = d;
 #if RECEIVER_FACES == 1
     // Flux is counted in texels of the view, which are all alike; what can be resolved, in those of the map.
     a.xy = texelFetch(t_projected, texel, 0).xy;
@@ -112,5 +126,7 @@ void main() {
     c.xy = texelFetch(t_projected, up, 0).xy;
     d.xy = texelFetch(t_projected, both, 0).xy;
 #endif
-    o_cell = vec4(densities(a, b, c, sides.x, o_weight.y), densities(b, d, c, sides.y, o_weight.y));
+    vec2 sides = sign(vec2(signed_area(map_a, map_b, map_c), signed_area(map_b, map_d, map_c)));
+    vec2 areas = vec2(drawn_area(map_a, map_b, map_c, (a + b + c).xy / 3.0), drawn_area(map_b, map_d, map_c, (b + d + c).xy / 3.0));
+    o_cell = vec4(densities(a, b, c, sides.x, areas.x, o_weight.y), densities(b, d, c, sides.y, areas.y, o_weight.y));
 }

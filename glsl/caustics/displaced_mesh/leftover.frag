@@ -67,17 +67,18 @@ void main() {
     warp(projected.xy, u_receiver_size, rate);
 #endif
     vec3 c = vec3(a.x * a.x + b.x * b.x, a.x * a.y + b.x * b.y, a.y * a.y + b.y * b.y) + vec3(rate.x * rate.x, 0.0, rate.y * rate.y) * dot(alone, alone);
-    c = c * (u_sigma * u_sigma) + vec3(PIXEL_VARIANCE, 0.0, PIXEL_VARIANCE);
+    c *= u_sigma * u_sigma;
     float half_trace = 0.5 * (c.x + c.z);
     float largest = half_trace + sqrt(max(half_trace * half_trace - (c.x * c.z - c.y * c.y), 0.0));
-    float radius = sqrt(CUTOFF * largest);
-    float shrink = min(1.0, u_max_radius / radius);  // keeps its flux and its shape
-    c *= shrink * shrink;
-    float det = max(c.x * c.z - c.y * c.y, 1e-8);
+    // A splat that is too wide keeps its flux and its shape; never does it get narrower than the map's own filter.
+    float most = max(u_max_radius * u_max_radius / CUTOFF - PIXEL_VARIANCE, 0.0);
+    c = c * min(1.0, most / max(largest, 1e-30)) + vec3(PIXEL_VARIANCE, 0.0, PIXEL_VARIANCE);
+    float radius = sqrt(CUTOFF * (min(largest, most) + PIXEL_VARIANCE));
+    float det = max(c.x * c.z - c.y * c.y, PIXEL_VARIANCE * PIXEL_VARIANCE);
     float integral = 2.0 * GLC_PI * sqrt(det) * (1.0 - exp(-0.5 * CUTOFF) * (1.0 + 0.5 * CUTOFF));
 #if RECEIVER_FACES == 1
     centre += 0.5 * u_map_size;
 #endif
-    o_splat = vec4(centre, radius * shrink, float(grid_face(projected)));
+    o_splat = vec4(centre, radius, float(grid_face(projected)));
     o_conic = vec4(c.z / det, -c.y / det, c.x / det, (1.0 - share) / integral);
 }

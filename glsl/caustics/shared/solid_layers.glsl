@@ -57,6 +57,8 @@ bool settle_on(GlcView view, Layers at, vec3 o, vec3 d, inout GlcHit hit) {
     vec3 n = layer_normal(at, (vec2(at.texel) + 0.5) / view.size, -d);
     float d_n = dot(d, n);
     float t = abs(d_n) > 1e-3 ? dot(at.surface_ws - o, n) / d_n : hit.t;
+    // Beside an edge a ray may start a texel or two beyond the face that it is about to leave through.
+    if (t < 0.0 && d_n > 0.0 && t > -2.0 * GLC_REACH * glc_texel_width(view, o)) t = 0.0;
     vec3 p = o + t * d, off = p - at.surface_ws, l = glc_light_direction(view, p);
     if (t < 0.0 || length(off - l * dot(off, l)) > 2.0 * GLC_REACH * glc_texel_width(view, at.surface_ws)) return false;
     hit.t = t;
