@@ -72,7 +72,6 @@ class CameraState:
             "u_world_from_camera": self.world_from_camera,
             "u_camera_lens": self.lens,
             "u_camera_jitter": self.jitter_uv,
-            "u_camera_clip_from_world": self.clip_from_world,
             "u_camera_from_world": self.camera_from_world,
             "u_eye_ws": tuple(self.world_from_camera[:3, 3]),
             "u_eye_direction": (*forward, 1.0 if self.orthographic else 0.0),

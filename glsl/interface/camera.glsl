@@ -2,7 +2,6 @@
 uniform mat4 u_world_from_camera;
 uniform vec4 u_camera_lens;   // xy: tangents of the half angles (perspective) or half sizes in metres (orthographic); z: 1 = orthographic
 uniform vec2 u_camera_jitter; // uv: sub-pixel shift of the picture, contained in the matrix too (anti-aliasing)
-uniform mat4 u_camera_clip_from_world;
 
 // World position of a pixel. depth_m: distance along the view axis.
 vec3 glc_camera_position_ws(vec2 uv, float depth_m) {
@@ -14,11 +13,4 @@ vec3 glc_camera_position_ws(vec2 uv, float depth_m) {
 vec3 glc_camera_ray_ws(vec2 uv) {
     vec3 d = u_camera_lens.z == 0.0 ? vec3(((uv - u_camera_jitter) * 2.0 - 1.0) * u_camera_lens.xy, -1.0) : vec3(0.0, 0.0, -1.0);
     return normalize((u_world_from_camera * vec4(d, 0.0)).xyz);
-}
-
-// uv in xy, distance along the view axis (metres) in z.
-vec3 glc_camera_project(vec3 p_ws) {
-    vec4 clip = u_camera_clip_from_world * vec4(p_ws, 1.0);
-    float depth_m = -dot(vec3(u_world_from_camera[2]), p_ws - vec3(u_world_from_camera[3]));
-    return vec3(clip.xy / (clip.w > 0.0 ? clip.w : 1.0) * 0.5 + 0.5, clip.w > 0.0 ? depth_m : -1.0);
 }
