@@ -3,16 +3,22 @@
 
 const float GLC_PI = 3.14159265358979;
 
-// Unpolarised reflectance of a dielectric. cos_i: cosine of incidence on the side the light comes from, in [0, 1];
-// eta = n_to / n_from. 1 under total internal reflection.
-float glc_fresnel_dielectric(float cos_i, float eta) {
-    cos_i = clamp(cos_i, 0.0, 1.0);
-    float cos_t2 = 1.0 - (1.0 - cos_i * cos_i) / (eta * eta);
-    if (cos_t2 <= 0.0) return 1.0;
-    float cos_t = sqrt(cos_t2);
+// Cosine of refraction by Snell's law, 0 under total internal reflection. cos_i: of incidence, on the side the light comes from, in
+// [0, 1]; eta = n_to / n_from.
+float glc_cos_transmitted(float cos_i, float eta) {
+    return sqrt(max(1.0 - (1.0 - cos_i * cos_i) / (eta * eta), 0.0));
+}
+
+// Unpolarised reflectance of a dielectric, 1 under total internal reflection. cos_t: as above.
+float glc_fresnel_dielectric(float cos_i, float cos_t, float eta) {
     float r_parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
     float r_perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-    return 0.5 * (r_parallel * r_parallel + r_perpendicular * r_perpendicular);
+    return cos_t > 0.0 ? 0.5 * (r_parallel * r_parallel + r_perpendicular * r_perpendicular) : 1.0;
+}
+
+float glc_fresnel_dielectric(float cos_i, float eta) {
+    cos_i = clamp(cos_i, 0.0, 1.0);
+    return glc_fresnel_dielectric(cos_i, glc_cos_transmitted(cos_i, eta), eta);
 }
 
 // Reflectance of a metal as glTF 2.0 defines it (Schlick 1994): f0 is the base colour.

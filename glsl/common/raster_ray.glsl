@@ -24,8 +24,9 @@ GlcRasterRay glc_raster_ray_from(mat4 raster_from_world, vec2 size, vec3 start, 
     ray.start = start;
     ray.step = length_m * (dq.xyz - ray.start * dq.w) / ray.w.y;
     vec2 room = mix(ray.start.xy, size - ray.start.xy, greaterThan(ray.step.xy, vec2(0.0)));
-    vec2 leaves = room / max(abs(ray.step.xy), vec2(1e-6));
-    ray.u_screen = clamp(min(leaves.x, leaves.y), 0.0, 1.0);
+    vec2 speed = max(abs(ray.step.xy), vec2(1e-6));
+    bool sideways = room.x * speed.y < room.y * speed.x;
+    ray.u_screen = clamp(sideways ? room.x / speed.x : room.y / speed.y, 0.0, 1.0);
     return ray;
 }
 

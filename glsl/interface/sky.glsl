@@ -5,7 +5,7 @@ uniform vec3 u_sky_ground;
 
 vec3 glc_sky_radiance(vec3 d) {
     float up = clamp(d.y, -1.0, 1.0);
-    return up >= 0.0 ? mix(u_sky_horizon, u_sky_zenith, sqrt(up)) : mix(u_sky_horizon, u_sky_ground, sqrt(-up));
+    return mix(u_sky_horizon, up >= 0.0 ? u_sky_zenith : u_sky_ground, sqrt(abs(up)));
 }
 
 // Irradiance of that sky on a plane with normal n, unoccluded: E = pi x cosine-weighted mean. Over the upper half the mean of

@@ -95,11 +95,13 @@ struct Rays {
 
 Rays rays_of(Surface at) {
     Rays rays;
-    rays.share = glc_fresnel_dielectric(at.cos_i, at.eta);
+    float cos_t = glc_cos_transmitted(at.cos_i, at.eta);
+    rays.share = glc_fresnel_dielectric(at.cos_i, cos_t, at.eta);
     rays.weight = at.mirror ? glc_fresnel_metal(at.object.base_color, at.cos_i) : vec3(rays.share);
     rays.reflects = at.mirror || rays.share > REFLECT_FROM;
     rays.mirror_d = reflect(at.v, at.n);
-    rays.refracts = glc_refract(at.v, at.n, at.eta, rays.d) && !at.mirror;
+    rays.refracts = cos_t > 0.0 && !at.mirror;
+    rays.d = (at.v + at.cos_i * at.n) / at.eta - cos_t * at.n;
 #if FINISH
     rays.refracts = rays.refracts && texelFetch(t_todo, ivec2(gl_FragCoord.xy), 0).r > 0.5 * (GLC_TODO_REFLECTION + GLC_TODO_ALL);
 #endif

@@ -54,10 +54,9 @@ void set_surface(inout Surface at, vec4 stored) {
     // A shading normal that leans away from the eye would reflect into the surface: bring it back to grazing.
     at.n = stored.xyz;
     at.cos_i = -dot(at.n, at.v);
-    if (at.cos_i < 0.02) {
-        at.n = normalize(at.n - at.v * (0.02 - at.cos_i));
-        at.cos_i = max(-dot(at.n, at.v), 0.02);
-    }
+    float lean = max(0.02 - at.cos_i, 0.0), unit = inversesqrt(1.0 + lean * (2.0 * at.cos_i + lean));
+    at.n = unit * (at.n - lean * at.v);
+    at.cos_i = max(unit * (at.cos_i + lean), 0.02);
     at.mirror = HAS_MIRROR == 1 && at.object.kind == GLC_MIRROR;
 #if HAS_MEDIA
     at.from_dense = stored.w < 0.0 && (at.object.kind == GLC_INTERFACE || -stored.w == at.before.solid);
