@@ -21,6 +21,7 @@ const int OWN_TRIES = 3;
 // A solid's exit and a mirror that touches it differ by rounding: look this part of the depth before the exit, too.
 const float TOUCHING = 2e-4;
 const float RIM_SLACK = 0.5;         // of a rim's thickness
+const float FLAT_PX = 16.0, FLAT_COSINE = 0.9999;
 
 // The planes of a solid's rim run on behind it: a ray that meets them farther off than the far side of the solid passes behind it.
 bool stands_at(GlcRasterRay ray, vec2 texel, float u) {
@@ -34,12 +35,15 @@ bool stands_at(GlcRasterRay ray, vec2 texel, float u) {
     return true;
 }
 
-// Beyond the picture's border the surface there goes on as a plane.
+// Beyond the picture's border a surface that is flat there goes on. A curved one ends: neither its sides nor its exit can be guessed.
 bool goes_on_beyond(GlcRasterRay ray, float own, out vec4 met, out float u) {
     vec2 px = clamp(ray.start.xy + ray.u_screen * ray.step.xy, vec2(0.5), u_raster_size - 0.5);
     vec2 f = glc_raster_plane(ray, texelFetch(t_behind_plane, ivec2(px), 0));
     met = texelFetch(t_behind_normal, ivec2(px), 0);
     u = f.x / (f.y < 0.0 ? f.y : -1e-30);
+    vec2 inward = px - FLAT_PX * ray.step.xy / max(length(ray.step.xy), 1e-6);
+    vec4 within = texelFetch(t_behind_normal, ivec2(clamp(inward, vec2(0.5), u_raster_size - 0.5)), 0);
+    if (within.w != met.w || dot(within.xyz, met.xyz) < FLAT_COSINE) return false;
     return met.w != 0.0 && abs(met.w) != own && u >= ray.u_screen && u <= 1.0;
 }
 
