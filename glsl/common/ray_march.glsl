@@ -89,7 +89,7 @@ ivec2 glc_bounds_texel(vec2 index, float cell, vec2 size) {
 // edge-on). Two loops take turns, since a software renderer runs all of a loop's body for every pixel: over cells, one fetch a step,
 // and over the texels of the one cell that could not be skipped, GLC_MARCH_STAY of them at least: the fewer turns, the less rays side
 // by side wait for one another.
-const float GLC_MARCH_STAY = 6.0;
+const float GLC_MARCH_STAY = 8.0;
 
 GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRasterRay ray, int max_steps, out bool in_view,
                                 out float u_clear) {
