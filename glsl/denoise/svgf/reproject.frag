@@ -59,6 +59,7 @@ void main() {
     weights(f.y, wy);
     float width = svgf_pixel_width(here.depth_m), total = 0.0, total_inner = 0.0;
     vec4 inner = vec4(0.0);
+    vec3 least = vec3(1e30);    // of the 4 x 4 around
     vec2 nearest = vec2(0.0);   // its luminance, its weight
     // A view that stands still needs one texel; llvmpipe leaves a loop when all pixels are done with it.
     ivec2 moves = ivec2(greaterThan(f, vec2(1e-3))), columns = 1 + (TAPS - 1) * moves;
@@ -72,6 +73,8 @@ void main() {
         o_color += w * color;
         total += w;
         ivec2 q = k - (TAPS / 2 - 1);
+        if (any(lessThan(q, ivec2(-1))) || any(greaterThan(q, ivec2(2)))) continue;
+        least = min(least, color.rgb);
         if (any(lessThan(q, ivec2(0))) || any(greaterThan(q, ivec2(1)))) continue;
         vec2 moments = texelFetch(t_moments, texel, 0).rg;
         if (!svgf_is_finite(moments.xyxy)) continue;
@@ -84,9 +87,10 @@ void main() {
     if (total_inner < 0.01) { o_color = vec4(0.0); o_moments = vec4(0.0); return; }
     inner /= total_inner;
     o_moments.xy /= total_inner;
-    // Where some of the four are missing, the others are all that is known. Beside a line a polynomial undershoots, light does not.
+    // Where some of the four are missing, the others are all that is known. Beside a line a polynomial undershoots, frame by frame more: no
+    // darker than half of what is around. (Keeping it within that, from above as well, would wear the lines away.)
     bool whole = total_inner > 0.999 && total > 0.5;
-    o_color = vec4(whole ? max(o_color.rgb / total, vec3(0.0)) : inner.rgb, inner.w);
+    o_color = vec4(whole ? max(o_color.rgb / total, 0.5 * least) : inner.rgb, inner.w);
     // An edge between texels could as well be anywhere between them: the history is off by about what shifting the nearest one by makes.
     o_moments.z = nearest.x - svgf_luminance(o_color.rgb);
 }
