@@ -25,7 +25,8 @@ from glcaustics.scene.model import FloatArray, OpticalKind
 MAX_LAYERS = 2
 CHAIN = "specular2.chain.bounds"
 READS = ("specular.plane", "specular2.plane", "specular2.normal_ws", CHAIN)
-BACK_READS = ("specular2.back_plane", "specular2.back_normal_ws")
+TURNED, TURNED_CHAIN = "specular2.turned_plane", "specular2.turned_chain.bounds"
+BACK_READS = ("specular2.back_plane", "specular2.back_normal_ws", TURNED, TURNED_CHAIN)
 MASK = "view.second_depth"
 CANDIDATES = {"BEHIND": "view.behind"}
 STATE = {"POINT": "view.second_point", "WAY": "view.second_way", "SHARE": "view.second_share"}
@@ -83,6 +84,27 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
                 view_dependent=True,
             )
         )
+        _declare_turned(graph, setup)
+
+
+def _declare_turned(graph: FrameGraph, setup: FrameSetup) -> None:
+    """The solids' far sides as met from behind, for rays that come down on what the eye does not see of them."""
+    graph.add(
+        PassDecl(
+            "gbuffer.specular2_turned",
+            {TURNED: TextureDesc("rgba32f", setup.size)},
+            _turn,
+            reads=("specular2.back_plane",),
+            note="the same, as met from behind",
+        )
+    )
+    depth_chain.declare_over(graph, "specular2.turned_chain", TURNED, setup.size)
+
+
+def _turn(ctx: PassContext) -> None:
+    if in_view(ctx.frame, ctx.setup.size):
+        turn = ctx.device.program("passes/gbuffer/turned_plane").set(t_plane=ctx.texture("specular2.back_plane"))
+        ctx.device.draw_fullscreen(turn, ctx.target(TURNED))
 
 
 def reads(setup: FrameSetup) -> tuple[str, ...]:
@@ -235,6 +257,9 @@ def go_on(ctx: PassContext, outputs: dict[str, str], program: Callable[..., Prog
 _BEHIND = {
     "t_behind_bounds": CHAIN,
     "t_behind_back": "specular2.back_plane",
+    "t_turned_plane": TURNED,
+    "t_turned_bounds": TURNED_CHAIN,
+    "t_turned_normal": "specular2.back_normal_ws",
     "t_opaque_plane": "gbuffer.plane",
     "t_opaque_bounds": "depth_chain.bounds",
 }

@@ -193,6 +193,23 @@ def test_a_glass_ball_sunk_in_a_pool() -> None:
     assert not (seen & ~path.alive).sum() > 0.02 * path.alive.sum()  # beside the ball nothing moved
 
 
+def test_the_outline_of_a_sunken_ball_is_that_of_the_bent_rays() -> None:
+    """What they see of it beyond the outline that the eye would see is met from behind."""
+    centre, radius = np.array([0.1, -0.8, 0.0]), 0.5
+    ball = Instance("ball", icosphere("ball", radius, 48), GREEN, translation(*centre))
+    camera = Camera.look_at((0.0, 0.6, 3.4), (0.0, -0.5, 0.0), yfov_rad=0.45)
+    frame, bare = (look(replace(ball_in_pool(*more), camera=camera)) for more in ([ball], []))
+    path = Path(camera)
+    path.to_plane(Y, 0.0)
+    path.refract(Y, 1.0, N_WATER)
+    path.to_sphere(centre, radius, SEA.sigma_a)
+    limb = path.alive & (((path.p - centre) * (camera.position_ws - path.p)).sum(axis=2) < 0.0)
+    drawn = np.abs(frame.image - bare.image).max(axis=2) > 1e-4
+    print("limb:", limb.sum(), "drawn:", drawn[limb].mean(), "of all:", drawn[path.alive].mean())
+    assert limb.sum() > 40 and drawn[limb].mean() > 0.75 and drawn[path.alive].mean() > 0.985
+    assert (drawn & ~path.alive).sum() < 0.01 * path.alive.sum()
+
+
 def test_a_floating_ball_ends_under_water() -> None:
     """Half in, half out: what enters above the water and leaves below it refracts by both indices."""
     radius = 0.5

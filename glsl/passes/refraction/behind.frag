@@ -10,6 +10,9 @@ uniform sampler2D t_behind_normal;
 uniform sampler2D t_behind_bounds;
 #if HAS_SOLID
 uniform sampler2D t_behind_back;     // of its solids, the back faces' planes
+uniform sampler2D t_turned_plane;    // the same as met from behind
+uniform sampler2D t_turned_bounds;
+uniform sampler2D t_turned_normal;
 #endif
 uniform sampler2D t_opaque_plane;
 uniform sampler2D t_opaque_bounds;
@@ -23,14 +26,14 @@ const float TOUCHING = 2e-4;
 const float RIM_SLACK = 0.5;         // of a rim's thickness
 const float FLAT_PX = 16.0, FLAT_COSINE = 0.9999;
 
-// The planes of a solid's rim run on behind it: a ray that meets them farther off than the far side of the solid passes behind it.
+// The planes of a solid's rim run on before and behind it: a ray that meets them beyond its other side passes beside it.
 bool stands_at(GlcRasterRay ray, vec2 texel, float u) {
 #if HAS_SOLID
     float far_m = texelFetch(t_behind_back, ivec2(texel), 0).w;
     float near_m = texelFetch(t_behind_plane, ivec2(texel), 0).w;
-    float s = ray.start.z + u * ray.step.z;
+    float s = ray.start.z + u * ray.step.z, slack_m = RIM_SLACK * (far_m - near_m);
     float depth_m = ORTHOGRAPHIC == 1 ? -s : 1.0 / s;
-    if (far_m > 0.0) return depth_m <= far_m + RIM_SLACK * (far_m - near_m);
+    if (far_m > 0.0) return depth_m <= far_m + slack_m && depth_m >= near_m - slack_m;
 #endif
     return true;
 }
@@ -68,6 +71,24 @@ bool meets_second(GlcRasterRay ray, float own, out vec4 met, out float u) {
     }
     return false;
 }
+
+#if HAS_SOLID
+// The limb of a solid that the eye does not see, since only bent rays come down on it: met from behind.
+bool meets_limb(GlcRasterRay ray, float own, out vec4 met, out float u) {
+    GlcRasterRay turned = ray;
+    turned.start.z = -ray.start.z;
+    turned.step.z = -ray.step.z;
+    GlcSolve solve = glc_march_hierarchical(t_turned_bounds, t_turned_plane, turned, u_refraction_steps);
+    u = solve.u;
+    vec2 texel = solve.texel;
+    met = texelFetch(t_turned_normal, ivec2(texel), 0);
+    if (met.w == 0.0) {   // the texel beside the outline
+        texel = clamp(texel + 0.5 + 1.4 * ray.step.xy / max(length(ray.step.xy), 1e-6), vec2(0.0), u_raster_size - 0.001);
+        met = texelFetch(t_turned_normal, ivec2(texel), 0);
+    }
+    return solve.status == GLC_SOLVE_HIT && met.w != 0.0 && abs(met.w) != own && stands_at(ray, texel, u);
+}
+#endif
 
 #if NESTED
 // What stands within a closed solid, liquids in their glasses too: metres from p on to a solid or mirror before the exit; 0: none.
@@ -127,7 +148,12 @@ void main() {
         float u;
         vec3 from = at.object.kind == GLC_SOLID ? rays.p - TOUCHING * at.depth_m * rays.d : rays.p;
         GlcRasterRay ray = eye_ray(from, rays.d);
-        if (!rays.refracts || !rays.leaves || !meets_second(ray, abs(own), met, u) || is_hidden(ray, u)) discard;
+        if (!rays.refracts || !rays.leaves) discard;
+        bool meets = meets_second(ray, abs(own), met, u);
+#if HAS_SOLID
+        if (!meets) meets = meets_limb(ray, abs(own), met, u);
+#endif
+        if (!meets || is_hidden(ray, u)) discard;
         on_m = glc_raster_distance(ray, u);
         bool solid = at.object.kind == GLC_SOLID && !at.from_dense;
         float medium = solid ? (rays.under > 0.0 ? rays.under : MEDIUM_OF_EYE) : (at.from_dense ? MEDIUM_AIR : abs(own));

@@ -8,15 +8,20 @@ uniform sampler2D t_first_plane;
 uniform sampler2D t_first_normal;
 
 const int SURFACE_ITERATIONS = 6;
+const float LIMB_PX = 24.0;           // of way within a solid that was entered from behind, to look for the exit from
 
-// The layer's normal at a point, filtered over the texels of the surface that was met (w, as stored).
-vec3 second_normal(vec3 p, float w, vec3 fallback) {
+// The layer's normal at a point, filtered over the texels of the surface that was met (w, as stored; limb: of a solid's far side).
+vec3 second_normal(vec3 p, float w, bool limb, vec3 fallback) {
     vec4 q = u_raster_from_world * vec4(p, 1.0);
     vec2 at = q.xy / q.w - 0.5, first = floor(at), part = at - first;
     vec3 sum = vec3(0.0);
     for (int i = 0; i < 4; ++i) {
         vec2 corner = vec2(i & 1, i >> 1);
-        vec4 stored = texelFetch(t_specular_normal, ivec2(clamp(first + corner, vec2(0.0), u_raster_size - 1.0)), 0);
+        ivec2 texel = ivec2(clamp(first + corner, vec2(0.0), u_raster_size - 1.0));
+        vec4 stored = texelFetch(t_specular_normal, texel, 0);
+#if HAS_SOLID
+        if (limb) stored = texelFetch(t_back_normal, texel, 0) * vec4(-1.0, -1.0, -1.0, 1.0);
+#endif
         vec2 share = mix(1.0 - part, part, corner);
         sum += stored.w == w ? (share.x * share.y + 1e-6) * stored.xyz : vec3(0.0);
     }
@@ -43,7 +48,14 @@ Surface continued_surface(ivec2 pixel) {
     at.contained = point.w > 0.0 && at.before.solid > 0.0;
     if (at.contained) at.around = medium_of(MEDIUM_OF_EYE);
     at.carries = texelFetch(t_share, pixel, 0).rgb;
-    set_surface(at, vec4(second_normal(at.p, way.w, -at.v), way.w));
+    // A solid's far side, met from outside: the way in starts a little behind it.
+    bool limb = way.w < 0.0 && -way.w != at.before.solid && glc_object(int(0.5 - way.w) - 1).kind == GLC_SOLID;
+    at.limb_m = 0.0;
+    set_surface(at, vec4(second_normal(at.p, way.w, limb, -at.v), way.w));
+    if (limb) {
+        vec4 q = u_raster_from_world * vec4(at.p, 1.0);
+        at.limb_m = LIMB_PX * 2.0 * u_camera_lens.y / u_raster_size.y * (ORTHOGRAPHIC == 1 ? 1.0 : q.w);
+    }
     return at;
 }
 

@@ -32,14 +32,15 @@ bool refracted_ray(Surface at, inout vec3 p, inout vec3 d, inout vec3 tint, out 
 #if HAS_SOLID
     if (at.object.kind == GLC_SOLID && !at.from_dense) {
 #if HAS_MEDIA
-        float outside = at.around.ior / at.before.ior;
+        float outside = at.around.ior / at.before.ior, limb_m = at.limb_m;
 #if CONTINUED && NESTED
         if (at.contained) under = CONTAINED;
 #endif
 #else
         float outside = 1.0;
+        const float limb_m = 0.0;
 #endif
-        leaves = solid_through(p, d, at.object.ior.g, at.eta, at.object.sigma_a, tint, outside, under);
+        leaves = solid_through(p, d, limb_m, at.object.ior.g, at.eta, at.object.sigma_a, tint, outside, under);
         tint /= outside * outside;
 #if CONTINUED && NESTED
         if (leaves && under == CONTAINED) leaves = leave_first(p, d, at.around.ior / at.before.ior, at.before.sigma_a, tint);

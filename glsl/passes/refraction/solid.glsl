@@ -106,12 +106,14 @@ bool leave_first(inout vec3 p, inout vec3 d, float ior, vec3 sigma_a, inout vec3
 #endif
 
 // On entry d is the direction inside. tint takes Fresnel and absorption. Returns false where the light is still held inside after
-// one total internal reflection; d is then the direction that it would go on in. ior: solid_ior relative to what the ray came from; so
-// is outside, of what the solid stands in; under: object index + 1 of the interface that the exit lies below, 0 for none; before and after CONTAINED within another solid.
-bool solid_through(inout vec3 p, inout vec3 d, float solid_ior, float ior, vec3 sigma_a, inout vec3 tint, inout float outside, inout float under) {
+// one total internal reflection; d is then the direction that it would go on in. leg_m: 0, or a length to bracket the exit from.
+// ior: solid_ior relative to what the ray came from; so is outside, of what the solid stands in. under: object index + 1 of the
+// interface that the exit lies below, 0 for none; before and after, CONTAINED within another solid.
+bool solid_through(
+    inout vec3 p, inout vec3 d, float leg_m, float solid_ior, float ior, vec3 sigma_a, inout vec3 tint, inout float outside, inout float under
+) {
     bool contained = under == CONTAINED;
     under = 0.0;
-    float leg_m = 0.0;
     for (int bounce = 0; bounce < 2; ++bounce) {
         vec3 exit_ws, n, bent;
         float t;

@@ -39,6 +39,7 @@ struct Surface {
 #if HAS_MEDIA
     Medium before;       // what the ray to the surface runs in
     Medium around;       // what the rays behind a solid run in
+    float limb_m;        // a length, where the surface is a solid's that faces away from the eye; else 0
     bool contained;      // the surface lies within another closed solid, and `around` around that
     vec3 carries;        // of what leaves the surface, to the eye
 #endif
@@ -81,6 +82,7 @@ Surface surface_at(ivec2 pixel) {
     at.before = Medium(u_eye_sigma_a, u_eye_ior, u_eye_solid);
     at.around = at.before;
     at.contained = false;
+    at.limb_m = 0.0;
     at.carries = glc_eye_transmittance(v_uv, at.depth_m, u_bounds_min_ws, u_bounds_max_ws);
 #endif
     set_surface(at, texelFetch(t_specular_normal, pixel, 0));
