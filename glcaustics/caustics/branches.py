@@ -19,7 +19,6 @@ STATUS_WORDS = {  # negative values in landing.w; see solve.frag
     -3: "unconverged",
     -4: "no_exit_found",
     -5: "absorbed",
-    -6: "normal_faces_away",
     -7: "met_another_specular_surface",
 }
 NO_EXIT = -4

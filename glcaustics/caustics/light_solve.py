@@ -274,6 +274,7 @@ class LightMapMethod(CausticsMethod):
                 "LAYERS": self.layers(light) if branch.kind == SOLID else 1,
                 "RECEIVERS_INSIDE": int(branch.kind == SOLID and self._receivers_inside),
                 "HAS_MIRROR": int(branch.kind == REFLECT and OpticalKind.MIRROR in ctx.setup.kinds()),
+                "REFLECTION_FOLLOWED": int(any(b.kind == REFLECT for b in self.branches(ctx.setup, light))),
                 "NAIVE_FLUX": int(options.get("naive_flux", False)),
                 "ESTIMATE": ESTIMATES[options["estimate"]],
             },

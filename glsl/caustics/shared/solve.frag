@@ -40,8 +40,9 @@ layout(location = 0) out vec4 o_landing;  // xyz: landing point, metres, world; 
 layout(location = 1) out vec4 o_flux;     // rgb: flux (carried, or lost when status < 0), W or lm; w: look-ups
 
 #define GLC_DARK -5
-#define GLC_AVERTED -6
 #define GLC_SECOND_HIT -7
+
+const float GRAZING = 0.02;   // least cosine between normal and light
 
 vec3 texel_flux(GlcView view, vec3 p_ws, vec3 d, float n_dot_l) {
 #if NAIVE_FLUX
@@ -73,10 +74,10 @@ void main() {
     // The side the light is on decides which medium it comes from.
     bool from_dense = object.kind == GLC_INTERFACE && stored_normal.w < 0.0;
     vec3 n = stored_normal.xyz * (stored_normal.w < 0.0 ? -1.0 : 1.0);
+    // At a silhouette an interpolated normal can turn away from the light that its triangle sees: there the light grazes it.
+    n = glc_safe_normalize(n - d * max(GRAZING + dot(n, d), 0.0), -d);
     float n_dot_l = -dot(n, d);
     vec3 flux = texel_flux(caster_view, p, d, max(n_dot_l, 0.0)) * u_channels;
-    // At a silhouette an interpolated normal can turn away from the light that its triangle sees: no interface to speak of.
-    if (n_dot_l <= 0.0) { o_landing.w = float(GLC_AVERTED); o_flux.rgb = flux; return; }
     float ior = object.ior[u_channel];
     float eta = from_dense ? 1.0 / ior : ior;
     if (from_dense && u_light.w != 0.0) flux *= glc_transmittance(object.sigma_a, length(p - u_light.xyz));
@@ -90,7 +91,13 @@ void main() {
     bool in_absorber = from_dense;
 #else
     float transmitted_share = (1.0 - glc_fresnel_dielectric(n_dot_l, eta)) * object.transmission;
-    if (!glc_refract(d, n, eta, ray)) { o_landing.w = float(GLC_TIR); o_flux.rgb = flux; return; }
+    if (!glc_refract(d, n, eta, ray)) {
+#if !REFLECTION_FOLLOWED   // else another branch carries it
+        o_landing.w = float(GLC_TIR);
+        o_flux.rgb = flux;
+#endif
+        return;
+    }
     flux *= transmitted_share;
     bool in_absorber = object.kind == GLC_INTERFACE && !from_dense;
 #if BRANCH == GLC_IN_AND_OUT

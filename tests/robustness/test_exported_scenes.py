@@ -1,0 +1,83 @@
+"""Files as modellers export them, rendered with no option: finite, and where there is a truth, near it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import glcaustics as glc
+from glcaustics.optics.fresnel import transmittance_dielectric
+from glcaustics.optics.pixels import box_filter
+from glcaustics.optics.refract import refract
+from glcaustics.renderer import Frame
+from glcaustics.scene.model import OpticalKind
+from tests.gpu.feature_scenes import BACKEND, from_above
+from tests.robustness.exported_scenes import EXPORTED, ball, knot, write
+
+pytestmark = pytest.mark.gpu
+SIZE = 160
+
+
+def seen_from_above(path: Path, half_m: float, method: str = "auto") -> Frame:
+    """The irradiance of the floor, without what is specular in the way."""
+    scene = replace(glc.load_scene(path), camera=from_above(half_m, height_m=4.0))
+    with glc.Renderer(
+        scene, (SIZE, SIZE), method, "medium", BACKEND, aovs=("caustic_irradiance",), specular_view=False
+    ) as renderer:
+        return renderer.render(time=0.0)
+
+
+def irradiance(frame: Frame) -> np.ndarray:
+    """(40, 40), green."""
+    return box_filter(frame.aov["caustic_irradiance"][..., 1].astype(np.float64), (40, 40))
+
+
+@pytest.mark.parametrize("name", EXPORTED)
+def test_it_is_finite_and_little_light_is_lost(name: str, tmp_path: Path) -> None:
+    with glc.Renderer(
+        glc.load_scene(EXPORTED[name](tmp_path / "a.glb")), (96, 72), quality="medium", backend=BACKEND
+    ) as r:
+        frame = r.render(time=0.0)
+    assert np.isfinite(frame.image).all() and frame.image.max() > 0.0
+    solves = frame.stats["solves"]
+    lost = sum(s["flux_lost"] for s in solves) / sum(s["flux"] for s in solves)
+    print(f"{name}: lost {lost:.4f}")
+    assert lost < 0.1
+
+
+def test_a_tilted_sheet_lights_the_floor_behind_it(tmp_path: Path) -> None:
+    """Its plane cuts the floor's two triangles; parallel light falls evenly: E T cos(in) / cos(out) cos(floor)."""
+    frame = seen_from_above(EXPORTED["tilted sheet"](tmp_path / "a.glb"), 2.0)
+    tilt = math.radians(35.0)
+    normal, down = np.array([[-math.sin(tilt), math.cos(tilt), 0.0]]), np.array([[0.0, -1.0, 0.0]])
+    bent, _ = refract(down, normal, np.ones(1), np.full(1, 1.5))
+    share = float(transmittance_dielectric(np.asarray(math.cos(tilt)), 1.0, 1.5))
+    expected = share * math.cos(tilt) / -float((bent @ normal.T).item()) * -float(bent[0, 1])
+    centre = bent[0] / -bent[0, 1]  # where the sheet's middle, 1 m up, lights the floor
+    column, row = round((centre[0] + 2.0) / 4.0 * SIZE), round((centre[2] + 2.0) / 4.0 * SIZE)
+    lit = frame.aov["caustic_irradiance"][row - 8 : row + 8, column - 8 : column + 8, 1]
+    np.testing.assert_allclose(lit, expected, rtol=0.02)
+
+
+def test_slivers_of_a_sheet_add_no_light(tmp_path: Path) -> None:
+    """In a warped map a long narrow triangle covers far more than its landing points span; its flux stays its own."""
+    path = write(tmp_path / "a.glb", (knot(0.13), {"translation": [0.0, 0.5, 0.0]}))
+    mesh, splats = (irradiance(seen_from_above(path, 1.6, method)) for method in ("displaced_mesh", "caustic_map"))
+    error = np.sqrt(((mesh - splats) ** 2).mean()) / splats.mean()
+    print(f"knot: mesh against splats {error:.3f}, flux {mesh.sum() / splats.sum():.4f}")
+    assert error < 0.1
+    assert mesh.sum() == pytest.approx(splats.sum(), rel=0.01)
+
+
+def test_a_ball_that_lacks_three_triangles_is_a_ball(tmp_path: Path) -> None:
+    path = EXPORTED["ball with a hole"](tmp_path / "a.glb")
+    scene = glc.load_scene(path)
+    assert scene.instances[0].optical_kind is OpticalKind.SOLID
+    assert any("all but closed" in line for line in scene.announcements)
+    whole = write(tmp_path / "b.glb", (ball(0.4), {"translation": [0.0, 0.6, 0.0]}))
+    with_hole, without = (irradiance(seen_from_above(p, 0.8)) for p in (path, whole))
+    assert with_hole.sum() == pytest.approx(without.sum(), rel=0.02)
