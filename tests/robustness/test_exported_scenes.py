@@ -14,9 +14,9 @@ from glcaustics.optics.fresnel import transmittance_dielectric
 from glcaustics.optics.pixels import box_filter
 from glcaustics.optics.refract import refract
 from glcaustics.renderer import Frame
-from glcaustics.scene.model import OpticalKind
-from tests.gpu.feature_scenes import BACKEND, from_above
-from tests.robustness.exported_scenes import EXPORTED, ball, knot, write
+from glcaustics.scene.model import OpticalKind, Scene
+from tests.gpu.feature_scenes import BACKEND, from_above, lamp, plane, scene_of, sheet
+from tests.robustness.exported_scenes import EXPORTED, SLANTED, ball, knot, write
 
 pytestmark = pytest.mark.gpu
 SIZE = 160
@@ -81,3 +81,24 @@ def test_a_ball_that_lacks_three_triangles_is_a_ball(tmp_path: Path) -> None:
     whole = write(tmp_path / "b.glb", (ball(0.4), {"translation": [0.0, 0.6, 0.0]}))
     with_hole, without = (irradiance(seen_from_above(p, 0.8)) for p in (path, whole))
     assert with_hole.sum() == pytest.approx(without.sum(), rel=0.02)
+
+
+def lost_share(scene: Scene, **options: bool) -> float:
+    with glc.Renderer(scene, (32, 24), "displaced_mesh", "low", BACKEND, options=options) as renderer:
+        solves = renderer.render(time=0.0).stats["solves"]
+    return float(sum(s["flux_lost"] for s in solves) / sum(s["flux"] for s in solves))
+
+
+def test_total_reflection_under_water_is_lost_only_if_nobody_follows_it() -> None:
+    """Seen from a lamp 0.3 m below, a sheet of half 1 m lies mostly beyond the critical angle."""
+    room = [plane("floor", 2.0, -0.6), plane("roof", 2.0, 1.0, up=False), sheet("water", 1.0, 0.0)]
+    scene = scene_of(room, [lamp((0.0, -0.3, 0.0))], from_above(2.0))
+    followed, not_followed = lost_share(scene), lost_share(scene, reflect=False)
+    print(f"lost {followed:.4f}, without reflections {not_followed:.4f}")
+    assert followed < 0.01 < 0.1 < not_followed
+
+
+def test_the_limb_of_a_coarse_ball_loses_no_light(tmp_path: Path) -> None:
+    """With smooth normals those at its silhouette point away from the light that its triangles see."""
+    path = write(tmp_path / "a.glb", (ball(0.4, 10), {"translation": [0.0, 0.6, 0.0]}), sun_rotation=SLANTED)
+    assert lost_share(glc.load_scene(path)) < 0.02
