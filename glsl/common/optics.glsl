@@ -16,6 +16,7 @@ float glc_fresnel_dielectric(float cos_i, float cos_t, float eta) {
     return cos_t > 0.0 ? 0.5 * (r_parallel * r_parallel + r_perpendicular * r_perpendicular) : 1.0;
 }
 
+// The same, where the cosine behind the surface is not at hand.
 float glc_fresnel_dielectric(float cos_i, float eta) {
     cos_i = clamp(cos_i, 0.0, 1.0);
     return glc_fresnel_dielectric(cos_i, glc_cos_transmitted(cos_i, eta), eta);

@@ -71,6 +71,7 @@ GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, 
     return glc_march_dda(t_depth, t_plane, orthographic, ray, max_steps, in_view, u_clear);
 }
 
+// The same, where nobody asks whether all of it is in view either.
 GlcSolve glc_march_dda(sampler2D t_depth, sampler2D t_plane, bool orthographic, GlcRasterRay ray, int max_steps) {
     bool in_view;
     return glc_march_dda(t_depth, t_plane, orthographic, ray, max_steps, in_view);
@@ -83,14 +84,14 @@ ivec2 glc_bounds_texel(vec2 index, float cell, vec2 size) {
     return ivec2(index + (cell < 8.0 ? vec2(0.0) : coarse));
 }
 
+const float GLC_MARCH_STAY = 8.0; // texels tried in a row by the hierarchical march
+
 // The same samples over bounds of s in cells of 4 x 4, 16 x 16 and 64 x 64 texels, one texture (rg32f, largest and smallest s; see
 // glc_bounds_texel): whole cells that the ray is in front of, or stays behind, are skipped, so it finds what the pixel-exact march
 // finds. Where that finds nothing, it takes the first texel whose plane the ray crosses although no centre's depth told (blades seen
 // edge-on). Two loops take turns, since a software renderer runs all of a loop's body for every pixel: over cells, one fetch a step,
 // and over the texels of the one cell that could not be skipped, GLC_MARCH_STAY of them at least: the fewer turns, the less rays side
 // by side wait for one another.
-const float GLC_MARCH_STAY = 8.0;
-
 GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRasterRay ray, int max_steps, out bool in_view,
                                 out float u_clear) {
     in_view = true;
@@ -184,6 +185,7 @@ GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRaster
     return glc_march_hierarchical(t_bounds, t_plane, ray, max_steps, in_view, u_clear);
 }
 
+// The same, where nobody asks whether all of it is in view either.
 GlcSolve glc_march_hierarchical(sampler2D t_bounds, sampler2D t_plane, GlcRasterRay ray, int max_steps) {
     bool in_view;
     return glc_march_hierarchical(t_bounds, t_plane, ray, max_steps, in_view);

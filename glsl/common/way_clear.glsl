@@ -1,5 +1,7 @@
 #include "common/newton.glsl"
 
+// How far a ray is clear of a G-buffer, by few look-ups of depth bounds (a chain of them: Uludag 2014): no march, and on the safe side.
+
 // Cells of 16 x 16 texels, to all sides, over which depth_chain.near holds the nearest s, one channel each.
 const vec4 GLC_NEAR_CELLS = vec4(1.0, 2.0, 4.0, 6.0);
 
