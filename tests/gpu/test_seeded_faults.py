@@ -180,7 +180,7 @@ def test_metrics_see_the_missing_radiance_scale(tmp_path: Path) -> None:
     middle = np.zeros((BINS, BINS), bool)
     middle[BINS // 2 - 8 : BINS // 2 + 8, BINS // 2 - 8 : BINS // 2 + 8] = True
     truth = np.full((BINS, BINS, 3), passes**2 * 0.5 / (np.pi * WATER_IOR**2))
-    root = seeded(tmp_path / "glsl", ("tint /= eta * eta;", ""))
+    root = seeded(tmp_path / "glsl", ("tint /= at.eta * at.eta;", ""))
     well = abs(metrics.bias_of_mean(truth, render(case, aov="image"), mask=middle))
     ill = abs(metrics.bias_of_mean(truth, render(case, root, aov="image"), mask=middle))
     print(f"\nno 1/n^2: healthy {well:.4f}, with the fault {ill:.4f}")
