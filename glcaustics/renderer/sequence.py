@@ -9,7 +9,7 @@ from glcaustics.passes.camera import CameraState
 from glcaustics.passes.eye_medium import EyeMediumFinder
 from glcaustics.passes.frame import FrameSetup, FrameState
 from glcaustics.passes.geometry import GpuScene
-from glcaustics.scene.model import FloatArray, LightKind, Scene
+from glcaustics.scene.model import FloatArray, LightKind, OpticalKind, Scene
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear sRGB (Rec. 709)
 
@@ -67,13 +67,18 @@ class FrameSequence:
 
 
 def exposure_of(scene: Scene, receivers_ws: FloatArray) -> float:
-    """The scene's exposure, or one that shows a white surface in full light a stop above middle grey's.
+    """The scene's exposure, or one that shows a white surface in full light a stop above middle grey's. Where nothing
+    is there that the lights could fall on - glass alone - what is seen is the sky, and its light alone counts.
 
     Args:
         receivers_ws: (2, 3), metres; the receivers' box, in whose centre positional lights are judged.
     """
     if scene.exposure is not None:
         return scene.exposure
+    sky = float(np.dot(scene.sky.zenith, LUMINANCE)) * np.pi
+    receives = any(instance.optical_kind is OpticalKind.DIFFUSE for instance in scene.instances)
+    if sky > 0.0 and not receives:
+        return 1.3 * np.pi / sky
     centre = receivers_ws.mean(axis=0)
     lux = 0.0
     for light in scene.lights:
@@ -81,5 +86,4 @@ def exposure_of(scene: Scene, receivers_ws: FloatArray) -> float:
         if light.kind is not LightKind.DIRECTIONAL:
             power /= max(float(np.sum((centre - np.asarray(light.position_ws)) ** 2)), 1e-30)
         lux += power
-    sky = float(np.dot(scene.sky.zenith, LUMINANCE)) * np.pi
     return 1.3 * np.pi / max(lux + sky, 1e-30)
