@@ -7,6 +7,7 @@ from typing import Any
 
 from glcaustics.bench.analysis import solve_cost
 from glcaustics.bench.equal_error import PTRACER, best_of, ratio_text
+from glcaustics.bench.flicker import FILTER, PLAIN
 
 Report = Mapping[str, Any]
 Mark = dict[str, Any]  # what, mark, measured, at: texts; met: whether
@@ -17,6 +18,7 @@ CASCADE_SHARE, CASCADE_COST, NEWTON_COST, WATER_COST = 0.995, 1.0 / 3.0, 0.1, 10
 FULL_OF_WATER = 0.9  # share of the picture that is specular
 SAME_HITS, MARCH_COST = 0.995, 1.0 / 3.0
 PHOTON_RRMSE, PHOTON_FLIP = 0.10, 0.05
+FLICKER = 0.5  # of a plain exponential mean's
 EQUAL_ERROR = 1000.0
 MESH_RRMSE = {(128, 512): 0.035, (256, 1024): 0.010}  # (mesh, map) without folds
 FOLDED_MAE, FOLDED_MAP, STEADY_ORDER = 0.08, 1024, 1.0
@@ -74,6 +76,16 @@ def _photons(report: Report) -> Iterator[Mark]:
                     yield _mark(what, f"< {PHOTON_FLIP:.2f}", f"{row['flip']:.4f}", met, f"{p['side']}^2")
             yield from _equal_time(one)
         yield from _stages(one)
+        yield from _flicker(one)
+
+
+def _flicker(one: Mapping[str, Any]) -> Iterator[Mark]:
+    if one.get("flicker"):
+        p, found = one["settings"]["flicker"], {r["name"]: r["flicker"] for r in one["flicker"]["rows"]}
+        ratio = found[FILTER] / found[PLAIN]
+        what = f"{one['scene']}: flicker of the filter over a plain exponential mean's"
+        at = f"{p['size'][0]}x{p['size'][1]}, {p['photons']} photons, {p['pan_px']:g} px a frame"
+        yield _mark(what, f"<= {FLICKER:.2f}", f"{ratio:.2f}", ratio <= FLICKER, at)
 
 
 def _equal_time(one: Mapping[str, Any]) -> Iterator[Mark]:

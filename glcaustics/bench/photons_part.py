@@ -11,6 +11,7 @@ import numpy.typing as npt
 from glcaustics import metrics
 from glcaustics.bench.cells import Measured, Part
 from glcaustics.bench.equal_error import compare
+from glcaustics.bench.flicker import pan_flicker
 from glcaustics.bench.machine import instrument_key, versions
 from glcaustics.bench.measure import flip_of
 from glcaustics.bench.mitsuba_truth import Halves, agreement
@@ -43,7 +44,7 @@ def count_steps(plan: Plan, peers: bool) -> int:
     """How many steps `run` goes through."""
     p = plan.photon
     each = 3 + 3 * len(p.photons) + (len(p.peer_photons) if peers else 0) + bool(plan.validate)
-    return each * len(p.scenes)
+    return each * len(p.scenes) + len(set(p.scenes) & set(p.flicker.scenes))
 
 
 @dataclass(eq=False)
@@ -83,6 +84,8 @@ class PhotonsPart(Part):
             "final": self._final(scene, truth),
             "stages": self._stages(scene),
         }
+        if scene.name in p.flicker.scenes:
+            found["flicker"] = self._flicker(scene)
         if self.peers:
             found["equal"] = self._equal(scene, small)
         return found
@@ -167,6 +170,16 @@ class PhotonsPart(Part):
         key = self._key(scene, "picture", np.asarray(irradiance, np.float32))
         ldr: npt.NDArray[np.uint8] = self.cells.cell(f"{scene.name}: picture, {what}", key, make)[1]["ldr"]
         return ldr
+
+    def _flicker(self, scene: Scene) -> dict[str, Any]:
+        """Of a pan over still light: the filter and plainer means."""
+        plan = self.settings.flicker
+
+        def make() -> Measured:
+            return pan_flicker(scene, plan, self.cells.backend), {"none": np.zeros(0)}
+
+        key = self._key(scene, "flicker", instrument_key("flicker"), asdict(plan))
+        return self.cells.cell(f"{scene.name}: flicker while the camera pans", key, make)[0]
 
     # -- cost ---------------------------------------------------------------------------------------------------------
 

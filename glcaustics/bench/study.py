@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -86,10 +86,6 @@ class Study:
     def _facts(self, found: dict[str, Any]) -> dict[str, Any]:
         """What made the report: command, commit, machine, packages, plan."""
         renderers = [found.get("gl_renderer"), *(r.get("gl_renderer") for r in found["rows"])]
-        plan = {
-            name: dict(vars(value)) if name in ("timing", "photon", "eye", "seen", "mesh") else value
-            for name, value in vars(self.plan).items()
-        }
         return {
             "schema": SCHEMA,
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -99,6 +95,6 @@ class Study:
             "code": code_key(),
             "machine": machine() | {"gl_renderer": next((name for name in renderers if name), None)},
             "versions": versions(),
-            "plan": plan,
+            "plan": asdict(self.plan),
             "notes": self._cells.notes,
         }

@@ -83,12 +83,14 @@ PTRACER_NOTE = (
 
 
 def photon_tables(report: Report) -> Iterator[Table]:
-    """Per scene: errors after static frames, equal error, cost of the stages."""
+    """Per scene: errors after static frames, equal error, cost of the stages, flicker of a pan."""
     for one in report.get("photons") or []:
         yield _static_table(one)
         if one.get("equal"):
             yield _equal_time_table(one)
         yield _stage_table(one)
+        if one.get("flicker"):
+            yield _flicker_table(one)
 
 
 def _static_table(one: Mapping[str, Any]) -> Table:
@@ -164,6 +166,20 @@ def _stage_table(one: Mapping[str, Any]) -> Table:
     views = f"light views {first['view_size']}^2"
     note = f"{width}x{height}, {views}; ms by {first['clock']}; median of {first['frames']} frames"
     return Table(f"{one['scene']}: milliseconds and shares of a frame", head, rows, note)
+
+
+def _flicker_table(one: Mapping[str, Any]) -> Table:
+    p, found = one["settings"]["flicker"], one["flicker"]
+    rows = [[r["name"], f"{r['flicker']:.4f}", "" if r["rmse"] is None else f"{r['rmse']:.3f}"] for r in found["rows"]]
+    width, height = p["size"]
+    note = (
+        f"{width}x{height}, {p['photons']} photons, {found['motion_px']:.2f} px a frame over still light; the last "
+        f"{p['shown']} of {p['frames']} frames at {found['points']} points of the surfaces; plain: of the same frames, "
+        f"unfiltered, alpha 0.2; rel. RMSE at {p['reference_views']} views against {p['reference_frames']} frames of "
+        f"{p['reference_photons']} photons ({found['reference_seconds']:.0f} s)"
+    )
+    head = ("irradiance", "flicker", "rel. RMSE")
+    return Table(f"{one['scene']}: flicker of the surfaces while the camera pans", head, rows, note)
 
 
 def mesh_tables(report: Report) -> Iterator[Table]:

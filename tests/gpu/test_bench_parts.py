@@ -1,11 +1,14 @@
-"""The bench's instruments that need a renderer, at tiny sizes: given irradiance, static frames, stages, hits."""
+"""The bench's instruments that need a renderer, at tiny sizes: given irradiance, frames, stages, hits, flicker."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import glcaustics as glc
+from glcaustics.bench.flicker import EXPONENTIAL, FILTER, PLAIN, RAW, exponential_mean, pan_flicker, panned
 from glcaustics.bench.given import given_irradiance
 from glcaustics.bench.photons import (
     MARCHES,
@@ -17,10 +20,12 @@ from glcaustics.bench.photons import (
     stages_of,
     static_frames,
 )
+from glcaustics.bench.plan import FlickerPlan
 from glcaustics.caustics.registry import METHODS
 from glcaustics.errors import UsageError
+from glcaustics.passes.camera import CameraState
 from glcaustics.scene.model import Camera, Scene
-from tests.gpu.feature_scenes import BACKEND, box, plane, scene_of, sheet, sun
+from tests.gpu.feature_scenes import BACKEND, box, from_above, plane, scene_of, sheet, sun
 
 pytestmark = pytest.mark.gpu
 SIZE = (48, 48)
@@ -98,3 +103,38 @@ def test_hits_are_the_same_within_one_pixel() -> None:
     exact = np.array([[[5.5, 5.5, 1, 1], [5.5, 5.5, 1, 2], [5.5, 5.5, 1, 2], [0, 0, 0, -2]]], float)
     ours = np.array([[[6.4, 5.5, 1, 1], [7.5, 5.5, 1, 2], [5.5, 4.5, 1, 1], [3, 3, 1, 1]]], float)
     assert same_hits([ours], [exact]) == {"share": 2 / 3, "photons": 3, "marched": 0.5, "marched_photons": 2}
+
+
+def test_a_pan_is_followed_and_judged() -> None:
+    """Less noise is less flicker; the scene's own camera is the middle one of the pan."""
+    plan = FlickerPlan(
+        (), SIZE, 2000, frames=6, shown=4, pan_px=0.5, reference_photons=8000, reference_frames=2, reference_views=2
+    )
+    scene = room()
+    found = pan_flicker(scene, plan, BACKEND)
+    rows = {row["name"]: row for row in found["rows"]}
+    assert list(rows) == [RAW, PLAIN, EXPONENTIAL, FILTER] and found["points"] > 200
+    assert 0.2 < found["motion_px"] < 1.0  # 0.5 at the median depth
+    assert rows[RAW]["flicker"] > rows[PLAIN]["flicker"] > 0.0 and rows[RAW]["rmse"] > rows[FILTER]["rmse"] > 0.0
+    middle = panned(scene, plan, BACKEND).view_at(0.5 * plan.frames)
+    assert np.array_equal(middle.world_from_camera, scene.camera.world_from_camera)
+
+
+def test_the_plain_mean_follows_surfaces_and_begins_anew_where_they_were_hidden() -> None:
+    """A floor seen from above, one pixel a frame to the right: its pattern stays; a column that comes in is new."""
+    size, scene = (12, 8), scene_of([], [], from_above(4.0))
+    cameras, positions, frames = [], [], []
+    for k in range(3):
+        world = np.array(scene.camera.world_from_camera)
+        world[0, 3] += k  # 1 m: a pixel
+        view = replace(scene.camera, world_from_camera=world)
+        x, z = np.meshgrid(np.arange(12) - 5.5 + k, np.arange(8) - 3.5)
+        cameras.append(CameraState.make(view, size, np.array([[-9.0, -1.0, -9.0], [9.0, 1.0, 9.0]])))
+        positions.append(np.stack([x, 0.0 * x, z], axis=2))
+        frames.append(np.cos(x) + (0.0, 1.0, 0.0)[k])
+    positions[0][:, 5, 1] = -8.0  # something else was there
+    means = exponential_mean(np.stack(frames), np.stack(positions), cameras)
+    assert means[0] == pytest.approx(frames[0])
+    settled = np.cos(np.arange(12) - 5.5 + 2) + 0.8 * np.where(np.isin(np.arange(12), (3, 10)), 1.0, 0.2)
+    settled[11] = frames[2][0, 11]
+    assert means[2] == pytest.approx(np.broadcast_to(settled, (8, 12)))

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import asdict
 from typing import Any
 
 import pytest
 
 from glcaustics.bench.equal_error import compare, denoised_cost, equal_error, photon_law, ratio_text
+from glcaustics.bench.flicker import EXPONENTIAL, FILTER, PLAIN
 from glcaustics.bench.marks import marks
+from glcaustics.bench.plan import FlickerPlan
 from glcaustics.bench.tables import Table, all_tables
 
 VARIANCE, OVERHEAD_MS, MS_PER_PHOTON = 4000.0, 50.0, 0.001
@@ -90,16 +94,19 @@ def test_marks_are_judged_and_listed() -> None:
     assert marks({"rows": []}) == [] and list(all_tables({"rows": []})) == []
 
 
-def photons(rrmse: float, flip: float, share: float, tracing_ms: float) -> dict[str, Any]:
+def photons(rrmse: float, flip: float, share: float, tracing_ms: float, flicker: float) -> dict[str, Any]:
     """A report's entry for a flooded scene."""
     ms = {"tracing": tracing_ms, "storing": 1.0, "denoising": 5.0, "buffers": 2.0, "reflected": 2.0}
     stage = {"photons": 1000, "size": [64, 48], "view_size": 32, "clock": "processor time", "frames": 2}
     series = [{"frames": 16, "rrmse": rrmse, "rrmse_plain": rrmse, "bias": 0.0}]
-    settings = {"side": 64, "filtered": 32, "frames": 16, "view_size": 32}
+    settings = {"side": 64, "filtered": 32, "frames": 16, "view_size": 32, "flicker": asdict(FlickerPlan())}
+    rows = [{"name": n, "flicker": f, "rmse": None} for n, f in ((EXPONENTIAL, 0.2), (PLAIN, 0.05), (FILTER, flicker))]
+    panned = {"rows": rows, "points": 900, "motion_px": 0.3, "seconds": 2.0, "reference_seconds": 1.0}
     return {
         "scene": "flooded-cornell",
         "settings": settings,
         "reference": {"source": "beams", "noise": 0.01},
+        "flicker": panned,
         "static": [{"photons": 1000, "series": series, "frame_ms": 9.0, "processor_ms": 9.0, **series[0]}],
         "final": [{"photons": 1000, "flip": flip}],
         "stages": [
@@ -117,17 +124,27 @@ def photons(rrmse: float, flip: float, share: float, tracing_ms: float) -> dict[
         ({"flip": 0.06}, {"FLIP of the picture"}),
         ({"share": 0.99}, {"hits as pixel by pixel"}),
         ({"tracing_ms": 6.0}, {"tracing over dda's", "largest stage"}),
+        ({"flicker": 0.026}, {"flicker of the filter over a plain exponential mean's"}),
     ],
 )
 def test_marks_of_the_flooded_box(changed: dict[str, float], failed: set[str]) -> None:
-    good = {"rrmse": 0.05, "flip": 0.02, "share": 0.999, "tracing_ms": 3.0}
+    good = {"rrmse": 0.05, "flip": 0.02, "share": 0.999, "tracing_ms": 3.0, "flicker": 0.02}
     report = {"photons": [photons(**(good | changed))]}
     found = marks(report)
-    assert len(found) == 5
+    assert len(found) == 6
     assert {
         next(words for words in m["what"].replace(":", ",").split(", ")[::-1]) for m in found if not m["met"]
     } == failed
-    assert len(list(all_tables(report))) == 2
+    assert len(list(all_tables(report))) == 3
+
+
+def test_a_report_without_a_pan_has_no_flicker() -> None:
+    one = photons(0.05, 0.02, 0.999, 3.0, 0.02)
+    text = "".join(table.text() for table in all_tables({"photons": [one]}))
+    assert "0.30 px a frame" in text and re.search(r"plain exponential mean +0\.0500\n", text)
+    del one["flicker"]
+    assert not any("flicker" in m["what"] for m in marks({"photons": [one]}))
+    assert len(list(all_tables({"photons": [one]}))) == 2
 
 
 def test_a_table_is_aligned() -> None:
