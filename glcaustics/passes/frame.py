@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from glcaustics.passes.geometry import SPECULAR_KINDS, GpuScene, boxes_of, point
 from glcaustics.passes.grounds import grounds
 from glcaustics.passes.light_views import LightView
 from glcaustics.passes.receiver_views import ReceiverView, receiver_views
+from glcaustics.passes.solid_contents import holds_opaque
 from glcaustics.scene.model import FloatArray, Instance, Light, OpticalKind, Scene
 
 SAMPLE_TIMES_S = (0.0, 1.3, 2.9, 5.3)  # where an animated water is looked at to bound its motion
@@ -85,6 +87,11 @@ class FrameSetup:
     def kinds(self) -> set[OpticalKind]:
         """The optical kinds that occur."""
         return {instance.optical_kind for instance in self.instances()}
+
+    @cached_property
+    def opaque_inside(self) -> bool:
+        """Whether the eye's rays may end on something opaque before they leave a solid."""
+        return holds_opaque(self.instances())
 
     @property
     def has_specular(self) -> bool:

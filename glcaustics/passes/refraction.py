@@ -176,6 +176,8 @@ def _program(ctx: PassContext, outputs: dict[str, int], shader: str = SHADER, /,
         "USE_MARCH": stage["MARCH"],
         "USE_SOUSA": stage["SOUSA"],
         "HAS_SOLID": int(OpticalKind.SOLID in kinds),
+        "OPAQUE_INSIDE": int(not stage["SOUSA"] and ctx.setup.opaque_inside),
+        "BEHIND": int(shader == BEHIND),
         "ORTHOGRAPHIC": int(ctx.frame.camera.orthographic),
         "HAS_MIRROR": int(OpticalKind.MIRROR in kinds),
     }

@@ -1,5 +1,7 @@
 // Where the refracted ray of the first specular surface meets one of another object before it meets anything opaque: there the same
 // shading goes on (refraction.frag, CONTINUED). Of the first surface only its reflection is left in the view, or left to do.
+uniform sampler2D t_opaque_plane;
+uniform sampler2D t_opaque_bounds;
 #include "passes/refraction/rays.glsl"
 #include "passes/refraction/media.glsl"
 
@@ -14,8 +16,6 @@ uniform sampler2D t_turned_plane;    // the same as met from behind
 uniform sampler2D t_turned_bounds;
 uniform sampler2D t_turned_normal;
 #endif
-uniform sampler2D t_opaque_plane;
-uniform sampler2D t_opaque_bounds;
 layout(location = LOCATION_POINT) out vec4 o_point;   // world space, metres; w: what the ray runs in there, MEDIUM_*
 layout(location = LOCATION_WAY) out vec4 o_way;       // unit direction; w: of the surface met, as in the layer's normals
 layout(location = LOCATION_SHARE) out vec4 o_share;   // of what that shows, how much the eye sees
@@ -90,6 +90,14 @@ bool meets_limb(GlcRasterRay ray, float own, out vec4 met, out float u) {
 }
 #endif
 
+// Whether something opaque stands before the end of a ray.
+bool is_hidden(GlcRasterRay ray, float u) {
+    GlcRasterRay way = ray;
+    way.step *= u;
+    way.u_screen = min(ray.u_screen / u, 1.0);
+    return glc_march_hierarchical(t_opaque_bounds, t_opaque_plane, way, u_refraction_steps).status == GLC_SOLVE_HIT;
+}
+
 #if NESTED
 // What stands within a closed solid, liquids in their glasses too: metres from p on to a solid or mirror before the exit; 0: none.
 float solid_holds(vec3 p, vec3 d, float own, out vec4 met) {
@@ -98,16 +106,12 @@ float solid_holds(vec3 p, vec3 d, float own, out vec4 met) {
     solid_exit(p, d, 0.0, exit_ws, n, t);
     GlcRasterRay ray = glc_raster_ray(u_raster_from_world, u_raster_size, p, d, t);
     if (!meets_second(ray, own, met, u)) return 0.0;
+#if OPAQUE_INSIDE
+    if (is_hidden(ray, u)) return 0.0;
+#endif
     return glc_object(int(abs(met.w) + 0.5) - 1).kind == GLC_INTERFACE ? 0.0 : glc_raster_distance(ray, u);
 }
 #endif
-// Whether something opaque stands before the end of a ray.
-bool is_hidden(GlcRasterRay ray, float u) {
-    GlcRasterRay way = ray;
-    way.step *= u;
-    way.u_screen = min(ray.u_screen / u, 1.0);
-    return glc_march_hierarchical(t_opaque_bounds, t_opaque_plane, way, u_refraction_steps).status == GLC_SOLVE_HIT;
-}
 
 // The first surface's part of the view, without what is behind it.
 void leave_reflection(Surface at, Rays rays) {
@@ -148,7 +152,7 @@ void main() {
         float u;
         vec3 from = at.object.kind == GLC_SOLID ? rays.p - TOUCHING * at.depth_m * rays.d : rays.p;
         GlcRasterRay ray = eye_ray(from, rays.d);
-        if (!rays.refracts || !rays.leaves) discard;
+        if (!rays.refracts || !rays.leaves || rays.under == ENDS_INSIDE) discard;
         bool meets = meets_second(ray, abs(own), met, u);
 #if HAS_SOLID
         if (!meets) meets = meets_limb(ray, abs(own), met, u);

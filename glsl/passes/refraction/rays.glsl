@@ -25,10 +25,11 @@ GlcRasterRay surface_ray(Surface at, vec3 d, float room_m) {
 }
 
 // The refracted ray, from where it leaves what is solid. d: unit, behind the surface. under: object index + 1 of the interface that a
-// solid is left below, or 0. False: it is still held inside.
-bool refracted_ray(Surface at, inout vec3 p, inout vec3 d, inout vec3 tint, out GlcRasterRay ray, out float under) {
+// solid is left below, or 0; ENDS_INSIDE: as ending says. False: it is still held inside.
+bool refracted_ray(Surface at, inout vec3 p, inout vec3 d, inout vec3 tint, out GlcRasterRay ray, out float under, out Ending ending) {
     bool leaves = true;
     under = 0.0;
+    ending = NO_ENDING;
 #if HAS_SOLID
     if (at.object.kind == GLC_SOLID && !at.from_dense) {
 #if HAS_MEDIA
@@ -40,10 +41,10 @@ bool refracted_ray(Surface at, inout vec3 p, inout vec3 d, inout vec3 tint, out 
         float outside = 1.0;
         const float limb_m = 0.0;
 #endif
-        leaves = solid_through(p, d, limb_m, at.object.ior.g, at.eta, at.object.sigma_a, tint, outside, under);
+        leaves = solid_through(p, d, limb_m, at.object.ior.g, at.eta, at.object.sigma_a, tint, outside, under, ending);
         tint /= outside * outside;
 #if CONTINUED && NESTED
-        if (leaves && under == CONTAINED) leaves = leave_first(p, d, at.around.ior / at.before.ior, at.before.sigma_a, tint);
+        if (leaves && under == CONTAINED) leaves = leave_first(p, d, at.around.ior / at.before.ior, at.before.sigma_a, tint, under, ending);
 #endif
         ray = eye_ray(p, d);
     } else
@@ -69,7 +70,7 @@ vec3 shown(Surface at, vec3 reflection, vec3 behind, float behind_m, float under
 #if HAS_MEDIA
     // Beyond an interface its own medium; around a solid, what it stands in; out of the eye's medium, air.
     vec3 far_sigma_a = at.object.kind == GLC_INTERFACE ? at.object.sigma_a : at.around.sigma_a;
-    if (at.from_dense || under > 0.0) far_sigma_a = vec3(0.0);
+    if (at.from_dense || under > 0.0 || under == ENDS_INSIDE) far_sigma_a = vec3(0.0);
     return at.carries * (reflection + glc_transmittance(far_sigma_a, behind_m) * behind);
 #else
     // Under water from the eye to the surface, over it along the refracted ray; solids count their own way.
@@ -88,7 +89,8 @@ struct Rays {
     vec3 d;
     vec3 tint;
     GlcRasterRay ray;
-    float under;         // object index + 1 of the interface that it leaves a solid below, or 0
+    float under;         // object index + 1 of the interface that it leaves a solid below, or 0; ENDS_INSIDE
+    Ending ending;
     vec3 mirror_d;
     vec3 weight;         // of the mirrored way
     float share;         // the same, of a dielectric
@@ -108,9 +110,10 @@ Rays rays_of(Surface at) {
 #endif
     rays.leaves = true;
     rays.under = 0.0;
+    rays.ending = NO_ENDING;
     rays.p = at.p;
     rays.tint = vec3((1.0 - rays.share) * at.object.transmission);
-    if (rays.refracts) rays.leaves = refracted_ray(at, rays.p, rays.d, rays.tint, rays.ray, rays.under);
+    if (rays.refracts) rays.leaves = refracted_ray(at, rays.p, rays.d, rays.tint, rays.ray, rays.under, rays.ending);
     return rays;
 }
 
@@ -139,7 +142,7 @@ void look_everywhere(Surface at, Rays rays, inout Seen seen, inout vec3 reflecti
     Upward upward = Upward(false, false, 0.0, vec3(1.0));
 #endif
     for (;;) {
-        Seen found = look_along(ray, at.p, refracted ? rays.d : mirror_d, !refracted);
+        Seen found = look_along(ray, at.p, refracted ? rays.d : mirror_d, !refracted, rays.ending);
 #if CONTINUED
         if (!refracted && comes_up(at, found, upward, ray, mirror_d)) continue;
 #endif

@@ -39,7 +39,7 @@ void main() {
     if (rays.refracts && !rays.leaves) seen.status = GLC_VIEW_TIR;
 #else
     bool solved = true;
-    if (rays.refracts) seen = look_through(rays.ray, rays.p, rays.d, solved);
+    if (rays.refracts) seen = look_through(rays.ray, rays.p, rays.d, rays.ending, solved);
     if (rays.refracts && !rays.leaves) seen.status = GLC_VIEW_TIR;
 #if !FINAL
     if (!solved || at.mirror) seen = NOTHING;

@@ -88,12 +88,30 @@ bool within_first(vec3 p) {
     vec4 plane = texelFetch(t_first_back_plane, ivec2(px), 0);
     return plane.w > 0.0 && q.z / q.w > plane.z + dot(plane.xy, px);
 }
+#endif
 
+#if OPAQUE_INSIDE
+// Whether the ray from p, within a solid that it would leave after exit_m, ends on something opaque. tint: to there.
+bool ends_within(vec3 p, vec3 d, sampler2D t_far, float exit_m, bool found, vec3 sigma_a, inout vec3 tint, out Ending ending) {
+    GlcRasterRay ray = eye_ray(p, d);
+    ending = ending_of(ray, t_far, glc_raster_at(ray, exit_m), found);
+    if (ending.ends) tint *= glc_transmittance(sigma_a, glc_raster_distance(ray, ending.u));
+    return ending.ends;
+}
+#endif
+
+#if CONTINUED && NESTED
 // Out of the first surface's solid through its far side. ior: of what is around that, relative to it. False: it is held inside.
-bool leave_first(inout vec3 p, inout vec3 d, float ior, vec3 sigma_a, inout vec3 tint) {
+bool leave_first(inout vec3 p, inout vec3 d, float ior, vec3 sigma_a, inout vec3 tint, inout float under, inout Ending ending) {
     GlcRasterRay ray = eye_ray(p, d);
     GlcSolve solve = glc_newton(t_first_back_plane, ray, 1.0, SOLID_ITERATIONS);
     float u = solve.status == GLC_SOLVE_HIT ? solve.u : min(solve.u, solve.u_front), t = glc_raster_distance(ray, u);
+#if OPAQUE_INSIDE
+    if (ends_within(p, d, t_first_back_plane, t, solve.status == GLC_SOLVE_HIT, sigma_a, tint, ending)) {
+        under = ENDS_INSIDE;
+        return true;
+    }
+#endif
     vec2 uv = clamp((ray.start.xy + u * ray.step.xy) / u_raster_size, vec2(0.0), vec2(1.0));
     vec3 n = glc_safe_normalize(textureLod(t_first_back_normal, uv, 0.0).xyz, -d), bent;
     if (dot(n, d) > 0.0) n = -n;
@@ -108,17 +126,30 @@ bool leave_first(inout vec3 p, inout vec3 d, float ior, vec3 sigma_a, inout vec3
 // On entry d is the direction inside. tint takes Fresnel and absorption. Returns false where the light is still held inside after
 // one total internal reflection; d is then the direction that it would go on in. leg_m: 0, or a length to bracket the exit from.
 // ior: solid_ior relative to what the ray came from; so is outside, of what the solid stands in. under: object index + 1 of the
-// interface that the exit lies below, 0 for none; before and after, CONTAINED within another solid.
+// interface that the exit lies below, 0 for none; before and after, CONTAINED within another solid; ENDS_INSIDE: where ending says, p and d
+// are those of the ray within.
 bool solid_through(
-    inout vec3 p, inout vec3 d, float leg_m, float solid_ior, float ior, vec3 sigma_a, inout vec3 tint, inout float outside, inout float under
+    inout vec3 p, inout vec3 d, float leg_m, float solid_ior, float ior, vec3 sigma_a, inout vec3 tint, inout float outside, inout float under,
+    out Ending ending
 ) {
+    ending = NO_ENDING;
     bool contained = under == CONTAINED;
     under = 0.0;
     for (int bounce = 0; bounce < 2; ++bounce) {
         vec3 exit_ws, n, bent;
         float t;
+        bool found = solid_exit(p, d, leg_m, exit_ws, n, t);
+#if OPAQUE_INSIDE
+        bool solved = ending.solved;
+        if (ends_within(p, d, t_back_plane, t, found, sigma_a, tint, ending)) {
+            outside = ior;
+            under = ENDS_INSIDE;
+            return true;
+        }
+        ending.solved = ending.solved && solved;
+#endif
         // The other side of the solid is often hidden after a reflection inside: then the mirrored direction alone goes on.
-        if (!solid_exit(p, d, leg_m, exit_ws, n, t) && bounce > 0) return false;
+        if (!found && bounce > 0) return false;
         tint *= glc_transmittance(sigma_a, t);
 #if CONTINUED && NESTED
         under = contained && within_first(exit_ws) ? CONTAINED : 0.0;

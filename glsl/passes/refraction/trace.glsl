@@ -76,10 +76,16 @@ End end_of(GlcRasterRay ray, GlcSolve solve, float status) {
 }
 
 #if USE_NEWTON || USE_MARCH
-// The ray met nothing on the picture. Its last known surface is continued as a plane: if the ray meets that within the scene, the
-// surface is continued beyond its visible edge by its mirror image (where that is the same plane; else by its last texel), else it
-// is the sky. Continuous at the picture's border and at the rims of objects, and without streaks.
-End end_beyond(GlcRasterRay ray, GlcSolve solve) {
+// The last surface that a ray was known to be in front of, as a plane.
+struct Last {
+    vec2 px;
+    vec4 plane;
+    float u;         // there
+    bool meets;      // the ray meets it
+    float met;       // where
+};
+
+Last last_surface(GlcRasterRay ray, GlcSolve solve) {
     // Two pixels back: the rim itself is an edge-on surface as often as not.
     float back = 2.0 / max(max(abs(ray.step.x), abs(ray.step.y)), 1e-6);
     float u_last = max(min(solve.u_front, ray.u_screen) - back, 0.0);
@@ -87,10 +93,20 @@ End end_beyond(GlcRasterRay ray, GlcSolve solve) {
     vec4 plane = texelFetch(t_plane, ivec2(px), 0);
     vec2 f = glc_raster_plane(ray, plane);
     float met = f.x / (f.y < 0.0 ? f.y : -1e-30);
-    bool hidden = solve.status == GLC_SOLVE_HIDDEN;
-    bool meets = f.y < 0.0 && met > 0.0 && met <= 1.0;
+    return Last(px, plane, u_last, f.y < 0.0 && met > 0.0 && met <= 1.0, met);
+}
+
+// The ray met nothing on the picture. Its last known surface is continued as a plane: if the ray meets that within the scene, the
+// surface is continued beyond its visible edge by its mirror image (where that is the same plane; else by its last texel), else it
+// is the sky. Continuous at the picture's border and at the rims of objects, and without streaks.
+End end_beyond(GlcRasterRay ray, GlcSolve solve) {
+    Last last = last_surface(ray, solve);
+    vec2 px = last.px;
+    vec4 plane = last.plane;
+    float met = last.met;
+    bool hidden = solve.status == GLC_SOLVE_HIDDEN, meets = last.meets;
     if (hidden && !meets && plane.w > 0.0) {   // behind something, and the surface before it does not reach there: its rim
-        met = u_last;
+        met = last.u;
         meets = true;
     }
     vec2 beyond = ray.start.xy + met * ray.step.xy - px;
@@ -140,9 +156,11 @@ GlcRasterRay pixel_ray(float depth_m, vec3 d, float room_m) {
     return glc_raster_ray_from(u_raster_from_world, u_raster_size, start, w, d, room_m);
 }
 
+#include "passes/refraction/inside.glsl"
+
 #if !USE_MARCH
 // Along a refracted ray. solved: false where the last stage should look again.
-Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved) {
+Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, Ending ending, out bool solved) {
     solved = true;
 #if USE_SOUSA
     return look_sousa(ray, p, d);
@@ -153,10 +171,16 @@ Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved) {
     float above = glc_way_above(t_near, u_raster_size, ray);
 #endif
     GlcSolve solve = glc_newton_from(t_plane, ray, 1.0, above, RESTARTS == 1, u_refraction_iterations);
-    bool hit = solve.status == GLC_SOLVE_HIT, mixes;
     float status = GLC_VIEW_NEWTON;
+#if OPAQUE_INSIDE
+    if (ending.ends) {
+        solve = ending.solve;
+        status = ending.status;
+    }
+#endif
+    bool hit = solve.status == GLC_SOLVE_HIT, mixes;
 #if HAS_SECOND
-    if (!hit) look_behind(ray, u_refraction_steps, solve, status);
+    if (!hit && !ending.ends) look_behind(ray, u_refraction_steps, solve, status);
     hit = solve.status == GLC_SOLVE_HIT;
 #endif
     End end = end_of(ray, solve, hit ? status : GLC_VIEW_FALLBACK);
@@ -167,6 +191,9 @@ Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, out bool solved) {
     Seen seen = seen_at(end, d, ray, solve, mixes);
 #if !FINAL
     solved = hit && !mixes && glc_way_clear(t_bounds, u_raster_size, ray, above, solve.u, CLEAR_POINTS) >= solve.u;
+#if OPAQUE_INSIDE
+    solved = ending.solved && (ending.ends ? hit && !mixes : solved);
+#endif
 #endif
     seen.uv = estimate;   // the solver's own, for who judges it
     return seen;
@@ -190,18 +217,25 @@ GlcSolve solve_again(vec3 p, GlcRasterRay ray) {
 #endif
 
 #if USE_MARCH
-// Along a refracted or mirrored ray of the surface at p.
-Seen look_along(GlcRasterRay ray, vec3 p, vec3 d, bool mirrored) {
+// Along a refracted or mirrored ray of the surface at p. ending: of a refracted one.
+Seen look_along(GlcRasterRay ray, vec3 p, vec3 d, bool mirrored, Ending ending) {
     int steps = mirrored ? u_reflection_steps : u_refraction_steps;
     float status = GLC_VIEW_MARCHED;
     bool mixes, in_view = true;
-#if SEEDED
     GlcSolve solve = GlcSolve(0.0, 0.0, vec2(0.0), 1e6, GLC_SOLVE_DIVERGED, 0);
-    if (mirrored) solve = solve_again(p, ray);
-    if (solve.status != GLC_SOLVE_HIT) solve = MARCH(ray, steps, in_view);
-#else
-    GlcSolve solve = MARCH(ray, steps, in_view);
+    bool known = false;
+#if OPAQUE_INSIDE
+    if (ending.ends && !mirrored) {
+        known = true;
+        solve = ending.solve;
+        status = ending.status;
+    }
 #endif
+#if SEEDED
+    if (mirrored) solve = solve_again(p, ray);
+    known = known || solve.status == GLC_SOLVE_HIT;
+#endif
+    if (!known) solve = MARCH(ray, steps, in_view);
 #if HAS_SECOND
     if (!in_view) look_behind(ray, steps, solve, status);
 #endif
