@@ -43,8 +43,8 @@ INSTRUMENTS = ("photons", "given")  # whose code the cells depend on
 def count_steps(plan: Plan, peers: bool) -> int:
     """How many steps `run` goes through."""
     p = plan.photon
-    each = 3 + 3 * len(p.photons) + (len(p.peer_photons) if peers else 0) + bool(plan.validate)
-    return each * len(p.scenes) + len(set(p.scenes) & set(p.flicker.scenes))
+    each = 4 + 3 * len(p.photons) + (len(p.peer_photons) if peers else 0) + bool(plan.validate)
+    return each * len(p.scenes)
 
 
 @dataclass(eq=False)
@@ -83,9 +83,8 @@ class PhotonsPart(Part):
             "static": self._static(scene, small),
             "final": self._final(scene, truth),
             "stages": self._stages(scene),
+            "flicker": self._flicker(scene),
         }
-        if scene.name in p.flicker.scenes:
-            found["flicker"] = self._flicker(scene)
         if self.peers:
             found["equal"] = self._equal(scene, small)
         return found

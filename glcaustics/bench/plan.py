@@ -21,10 +21,10 @@ class FlickerPlan:
     """A pan of `frames` frames over still light by `pan_px` pixels a frame, at `size`; the last `shown` are judged.
 
     The error is that at `reference_views` of them (0: none), each against `reference_frames` (even) unfiltered frames
-    of `reference_photons`. On two cores 14 s, and the reference's 9 s; quick runs take a quarter of the reference.
+    of `reference_photons`. On two cores 14 to 22 s a scene, and the reference 9 to 13 s; quick runs take a quarter of
+    the reference.
     """
 
-    scenes: tuple[str, ...] = ("flooded-cornell",)
     size: tuple[int, int] = (240, 200)
     photons: int = 1 << 16
     frames: int = 44
@@ -41,7 +41,6 @@ class PhotonPlan:
 
     `photons`: a frame; `frames`: static ones. `cells`: of the reference's light mesh. `table_size`: of the picture
     whose passes are timed, over `table_frames` frames. `peer_photons`: of Mitsuba; `validate`: of each of its halves.
-    `flicker`: of those of its scenes that are among these.
     """
 
     scenes: tuple[str, ...] = ("flooded-cornell", "flooded-colonnade")

@@ -108,7 +108,7 @@ def test_hits_are_the_same_within_one_pixel() -> None:
 def test_a_pan_is_followed_and_judged() -> None:
     """Less noise is less flicker; the scene's own camera is the middle one of the pan."""
     plan = FlickerPlan(
-        (), SIZE, 2000, frames=6, shown=4, pan_px=0.5, reference_photons=8000, reference_frames=2, reference_views=2
+        SIZE, 2000, frames=6, shown=4, pan_px=0.5, reference_photons=8000, reference_frames=2, reference_views=2
     )
     scene = room()
     found = pan_flicker(scene, plan, BACKEND)

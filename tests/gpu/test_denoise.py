@@ -116,7 +116,7 @@ def test_panning_flickers_at_most_half_as_much_as_with_an_exponential_mean() -> 
     """Base lines: the plain mean of the same frames with alpha 0.2, looked up bilinearly, and the same filter with such
     a history (Schied et al. 2017).
     """
-    plan = FlickerPlan((), (SIZE, SIZE), 15_000, frames=56, shown=16, pan_px=0.37, reference_views=0)
+    plan = FlickerPlan((SIZE, SIZE), 15_000, frames=56, shown=16, pan_px=0.37, reference_views=0)
     found = pan_flicker(wavy(0.0, 0.0), plan, BACKEND)
     flicker = {row["name"]: row["flicker"] for row in found["rows"]}
     print(found["motion_px"], flicker)
