@@ -25,6 +25,8 @@ FILTERS: Mapping[str, Mapping[str, Any]] = {EXPONENTIAL: {"denoise_history": "ex
 ALPHA = 0.2  # of the plain mean: what a new frame weighs, as in Schied et al. 2017
 SAME_SURFACE = 0.05  # of the distance from the eye: farther from what a pixel shows, a point is hidden there
 POINT_STEP = 2  # pixels between the points that are followed
+CREASE = 0.5  # of the step over two pixels: a position that is farther from the middle of its neighbours is at an edge
+EDGE_REACH = 2  # pixels: nearer to an edge, a point's footprint may hold two surfaces
 REFERENCE_SEED = 1  # not the frames': the reference's noise must not be theirs
 
 
@@ -35,12 +37,13 @@ def pan_flicker(scene: Scene, plan: FlickerPlan, backend: str) -> dict[str, Any]
     position was the frame before, begun anew where that was hidden. No filter over space.
 
     Returns:
-        `rows`: `name`, `flicker` (metrics.surface_flicker of the luminance), `rmse` over the reference's mean, without
-        the reference's noise; None without a reference. `motion_px`: median of the points' motion from frame to frame;
-        `points`; `seconds` of all, `reference_seconds` of it.
+        `rows`: `name`, `flicker` (metrics.surface_flicker of the luminance), `off_edges` (of the points that never come
+        near a surface's edge, which flickers as its pixels do), `rmse` over the reference's mean, its noise taken off;
+        None without a reference. `motion_px`: median of the points' motion from frame to frame; `points`,
+        `points_off_edges`: how many; `seconds` of all, `reference_seconds` of it.
 
     Raises:
-        UsageError: no point stays in the picture.
+        UsageError: no point stays in the picture, or away from edges.
     """
     start, still = time.perf_counter(), panned(scene, plan, backend)
     raw, positions = _frames(still, plan, backend, {"denoise": False})
@@ -53,12 +56,16 @@ def pan_flicker(scene: Scene, plan: FlickerPlan, backend: str) -> dict[str, Any]
     reference_seconds = time.perf_counter() - before_reference
     last = slice(plan.frames - plan.shown, plan.frames)
     points, rows = _followed(positions[last], cameras[last]), []
+    inner = points[:, _off_edges(points, positions[last])]
     for name, frames in stacks.items():
         rmse = None if halves is None else _rmse(halves, frames[_views(plan)])
-        rows.append({"name": name, "flicker": metrics.surface_flicker(frames[last], points), "rmse": rmse})
+        flicker = {"flicker": metrics.surface_flicker(frames[last], points)}
+        flicker["off_edges"] = metrics.surface_flicker(frames[last], inner)
+        rows.append({"name": name, **flicker, "rmse": rmse})
     return {
         "rows": rows,
         "points": points.shape[1],
+        "points_off_edges": inner.shape[1],
         "motion_px": float(np.nanmedian(np.linalg.norm(np.diff(points, axis=0), axis=2))),
         "seconds": time.perf_counter() - start,
         "reference_seconds": reference_seconds,
@@ -135,6 +142,26 @@ def _followed(positions: FloatArray, cameras: Sequence[CameraState]) -> FloatArr
     points = points[np.isfinite(points).all(axis=1)]
     found = (_seen(points, shown, camera) for shown, camera in zip(positions, cameras, strict=True))
     return np.stack([np.where(seen[:, None], px, np.nan) for px, seen in found])
+
+
+def _off_edges(points_px: FloatArray, positions: FloatArray) -> BoolArray:
+    """(N,) which points (T, N, 2) show one surface alone around them in all pictures of positions (T, H, W, 3)."""
+    off = np.ones(points_px.shape[1], bool)
+    for px, shown in zip(points_px, positions, strict=True):
+        edge = np.zeros(shown.shape[:2], bool)
+        edge[1:-1] |= _creased(shown[:-2], shown[1:-1], shown[2:])
+        edge[:, 1:-1] |= _creased(shown[:, :-2], shown[:, 1:-1], shown[:, 2:])
+        around = np.lib.stride_tricks.sliding_window_view(np.pad(edge, EDGE_REACH), (2 * EDGE_REACH + 1,) * 2)
+        seen = np.isfinite(px).all(axis=1)
+        column, row = np.where(seen[:, None], px, 0.0).astype(int).T
+        off &= ~(seen & np.asarray(around.any(axis=(2, 3)))[row, column])
+    return off
+
+
+def _creased(before: FloatArray, here: FloatArray, after: FloatArray) -> BoolArray:
+    """Whether positions (..., 3) of three pixels in a row are not evenly spaced on one line, or one has none."""
+    off = np.linalg.norm(before - 2.0 * here + after, axis=-1)
+    return np.asarray(~(off <= CREASE * np.linalg.norm(after - before, axis=-1)))
 
 
 def _frames(still: Scene, plan: FlickerPlan, backend: str, options: Mapping[str, Any]) -> tuple[FloatArray, FloatArray]:

@@ -170,15 +170,18 @@ def _stage_table(one: Mapping[str, Any]) -> Table:
 
 def _flicker_table(one: Mapping[str, Any]) -> Table:
     p, found = one["settings"]["flicker"], one["flicker"]
-    rows = [[r["name"], f"{r['flicker']:.4f}", "" if r["rmse"] is None else f"{r['rmse']:.3f}"] for r in found["rows"]]
+    rows = []
+    for r in found["rows"]:
+        cells = [r["name"], f"{r['flicker']:.4f}", f"{r['off_edges']:.4f}"]
+        rows.append([*cells, "" if r["rmse"] is None else f"{r['rmse']:.3f}"])
     width, height = p["size"]
     note = (
         f"{width}x{height}, {p['photons']} photons, {found['motion_px']:.2f} px a frame over still light; the last "
-        f"{p['shown']} of {p['frames']} frames at {found['points']} points of the surfaces; plain: of the same frames, "
-        f"unfiltered, alpha 0.2; rel. RMSE at {p['reference_views']} views against {p['reference_frames']} frames of "
+        f"{p['shown']} of {p['frames']} frames at {found['points']} points of the surfaces, {found['points_off_edges']} without edges; "
+        f"plain: of the same frames, unfiltered, alpha 0.2; rel. RMSE at {p['reference_views']} views against {p['reference_frames']} frames of "
         f"{p['reference_photons']} photons ({found['reference_seconds']:.0f} s)"
     )
-    head = ("irradiance", "flicker", "rel. RMSE")
+    head = ("irradiance", "flicker", "without edges", "rel. RMSE")
     return Table(f"{one['scene']}: flicker of the surfaces while the camera pans", head, rows, note)
 
 

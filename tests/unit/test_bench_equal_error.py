@@ -100,8 +100,18 @@ def photons(rrmse: float, flip: float, share: float, tracing_ms: float, flicker:
     stage = {"photons": 1000, "size": [64, 48], "view_size": 32, "clock": "processor time", "frames": 2}
     series = [{"frames": 16, "rrmse": rrmse, "rrmse_plain": rrmse, "bias": 0.0}]
     settings = {"side": 64, "filtered": 32, "frames": 16, "view_size": 32, "flicker": asdict(FlickerPlan())}
-    rows = [{"name": n, "flicker": f, "rmse": None} for n, f in ((EXPONENTIAL, 0.2), (PLAIN, 0.05), (FILTER, flicker))]
-    panned = {"rows": rows, "points": 900, "motion_px": 0.3, "seconds": 2.0, "reference_seconds": 1.0}
+    rows = [
+        {"name": n, "flicker": f, "off_edges": f, "rmse": None}
+        for n, f in ((EXPONENTIAL, 0.2), (PLAIN, 0.05), (FILTER, flicker))
+    ]
+    panned = {
+        "rows": rows,
+        "points": 900,
+        "points_off_edges": 800,
+        "motion_px": 0.3,
+        "seconds": 2.0,
+        "reference_seconds": 1.0,
+    }
     return {
         "scene": "flooded-cornell",
         "settings": settings,
@@ -141,7 +151,7 @@ def test_marks_of_the_flooded_box(changed: dict[str, float], failed: set[str]) -
 def test_a_report_without_a_pan_has_no_flicker() -> None:
     one = photons(0.05, 0.02, 0.999, 3.0, 0.02)
     text = "".join(table.text() for table in all_tables({"photons": [one]}))
-    assert "0.30 px a frame" in text and re.search(r"plain exponential mean +0\.0500\n", text)
+    assert "0.30 px a frame" in text and re.search(r"plain exponential mean +0\.0500 +0\.0500\n", text)
     del one["flicker"]
     assert not any("flicker" in m["what"] for m in marks({"photons": [one]}))
     assert len(list(all_tables({"photons": [one]}))) == 2
