@@ -1,4 +1,4 @@
-"""Whether closed solids of a scene may hold opaque things, or lie in opaque walls: then the eye's rays may end in them."""
+"""Whether closed solids of a scene may hold opaque things, or lie in walls: then the eye's rays may end in them."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ STANDS_ON = 1  # sides of its box that a solid may touch: what stands on a floor
 
 
 def holds_opaque(instances: Sequence[Instance]) -> bool:
-    """Whether a triangle of an opaque surface reaches into the box of a solid, or such surfaces touch more than one side
-    of it. Boxes hold more than solids: what stands beside a ball counts, too, and only costs time.
+    """Whether a triangle of an opaque surface reaches into the box of a solid, or such surfaces touch more than one
+    side of it. Boxes hold more than solids: what stands beside a ball counts, too, and only costs time.
     """
     opaque = [(i, bounds_ws(i)) for i in instances if i.optical_kind is OpticalKind.DIFFUSE]
     for solid in instances:
@@ -34,7 +34,7 @@ def holds_opaque(instances: Sequence[Instance]) -> bool:
 
 
 def _contact(instance: Instance, low: FloatArray, high: FloatArray, air: float) -> tuple[bool, set[int]]:
-    """Whether a triangle reaches into a box by more than `air`, metres, and the sides (0-2 low, 3-5 high) it touches."""
+    """Whether a triangle reaches into a box by more than `air`, metres; sides (0-2 low, 3-5 high) that some touch."""
     corners = instance.positions_ws()[instance.mesh.triangles]
     least, most = corners.min(axis=1), corners.max(axis=1)
     meets = np.all((least <= high + air) & (most >= low - air), axis=1)

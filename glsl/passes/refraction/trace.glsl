@@ -76,7 +76,8 @@ End end_of(GlcRasterRay ray, GlcSolve solve, float status) {
 }
 
 #if USE_NEWTON || USE_MARCH
-// The last surface that a ray was known to be in front of, as a plane.
+// The last surface that a ray was known to be in front of, as a plane. before_px: where its way was in front of one before it
+// started, unless -1: that counts if all of it is hidden.
 struct Last {
     vec2 px;
     vec4 plane;
@@ -85,11 +86,12 @@ struct Last {
     float met;       // where
 };
 
-Last last_surface(GlcRasterRay ray, GlcSolve solve) {
+Last last_surface(GlcRasterRay ray, GlcSolve solve, vec2 before_px) {
     // Two pixels back: the rim itself is an edge-on surface as often as not.
     float back = 2.0 / max(max(abs(ray.step.x), abs(ray.step.y)), 1e-6);
     float u_last = max(min(solve.u_front, ray.u_screen) - back, 0.0);
     vec2 px = clamp(ray.start.xy + u_last * ray.step.xy, vec2(0.5), u_raster_size - 0.5);
+    if (before_px.x >= 0.0 && solve.u_front <= 0.0) px = before_px;
     vec4 plane = texelFetch(t_plane, ivec2(px), 0);
     vec2 f = glc_raster_plane(ray, plane);
     float met = f.x / (f.y < 0.0 ? f.y : -1e-30);
@@ -99,8 +101,8 @@ Last last_surface(GlcRasterRay ray, GlcSolve solve) {
 // The ray met nothing on the picture. Its last known surface is continued as a plane: if the ray meets that within the scene, the
 // surface is continued beyond its visible edge by its mirror image (where that is the same plane; else by its last texel), else it
 // is the sky. Continuous at the picture's border and at the rims of objects, and without streaks.
-End end_beyond(GlcRasterRay ray, GlcSolve solve) {
-    Last last = last_surface(ray, solve);
+End end_beyond(GlcRasterRay ray, GlcSolve solve, vec2 before_px) {
+    Last last = last_surface(ray, solve, before_px);
     vec2 px = last.px;
     vec4 plane = last.plane;
     float met = last.met;
@@ -186,7 +188,7 @@ Seen look_through(GlcRasterRay ray, vec3 p, vec3 d, Ending ending, out bool solv
     End end = end_of(ray, solve, hit ? status : GLC_VIEW_FALLBACK);
     vec2 estimate = end.uv;
 #if FINAL
-    if (!hit) end = end_beyond(ray, solve);
+    if (!hit) end = end_beyond(ray, solve, ending.px);
 #endif
     Seen seen = seen_at(end, d, ray, solve, mixes);
 #if !FINAL
@@ -241,7 +243,7 @@ Seen look_along(GlcRasterRay ray, vec3 p, vec3 d, bool mirrored, Ending ending) 
 #endif
     End end = end_of(ray, solve, status);
     vec2 estimate = end.uv;
-    if (solve.status != GLC_SOLVE_HIT) end = end_beyond(ray, solve);
+    if (solve.status != GLC_SOLVE_HIT) end = end_beyond(ray, solve, mirrored ? vec2(-1.0) : ending.px);
     Seen seen = seen_at(end, d, ray, solve, mixes);
     seen.uv = estimate;   // the solver's own, for who judges it
     return seen;
