@@ -15,6 +15,7 @@ import numpy as np
 
 from glcaustics.caustics.branches import NO_EXIT, SOLID, branches_of, read_rgba32f, solids_entered
 from glcaustics.caustics.map_warp import MapWarp, fit_warp
+from glcaustics.caustics.solid_views import SolidViews
 from glcaustics.gpu import Device
 from glcaustics.graph import FrameGraph
 from glcaustics.passes.fit_view import fit_view
@@ -59,22 +60,15 @@ def fit_receivers(
         Share of the light that lands, by branch kind; and the warps of the maps that get one, by the view's name.
     """
     everything = setup.instances()
-    casters = points_of([i for i in everything if i.optical_kind is not OpticalKind.DIFFUSE])
     receivers = points_of([i for i in everything if i.optical_kind is OpticalKind.DIFFUSE])
-    coarse = replace(
-        setup, options={**setup.options, "march_steps": max(32, int(setup.options["march_steps"]))}, lights=[]
-    )
     boxes = boxes_of(i for i in everything if i.optical_kind is OpticalKind.DIFFUSE)
-    caster = fit_view(
-        light.light, casters, COARSE_CASTER, depth_points_ws=points_of(everything), boxes_ws=boxes_of(everything)
-    )
-    coarse_light = replace(light, caster=caster, receivers=receiver_views(everything, light.light, COARSE_MAP))
-    coarse.lights = [coarse_light]
+    coarse = _coarse(setup, light)
+    (coarse_light,) = coarse.lights
     shares: dict[str, float] = {}
     trapped, solids = 0.0, _InSolids()
     one_pair_serves = _one_pair_serves(everything)
     for layers, texels in ((1, COARSE_MAP), (2, int(setup.options["map_size"]))):
-        method.set_layers(light, 1 if one_pair_serves else layers)
+        method.solids.set_layers(light, 1 if one_pair_serves else layers)
         landed, shares, solids = _coarse_solve(method, device, coarse, coarse_light, frame)
         for name, (points, weights) in landed.items():
             if len(points):
@@ -82,7 +76,7 @@ def fit_receivers(
                 view = _window(seen_from, points, weights, texels, setup.is_animated, receivers, boxes)
                 coarse_light.receivers[name] = replace(coarse_light.receivers[name], view=view)
         trapped = max(trapped, solids.trapped)
-    _decide_layers(method, light, one_pair_serves, trapped, solids.entered)
+    _decide_layers(method.solids, light, one_pair_serves, trapped, solids.entered)
     light.receivers = coarse_light.receivers
     warps: dict[str, MapWarp] = {}
     for name, (points, weights) in landed.items():
@@ -98,6 +92,31 @@ def fit_receivers(
             if core is not None:
                 light.receivers[core.name] = around = core
     return shares, warps
+
+
+def fit_layers(method: LightMapMethod, device: Device, setup: FrameSetup, light: LightSetup, frame: FrameState) -> None:
+    """Decide `method.solids.layers` alone, for photons, which need no windows; `method` solves for them."""
+    one_pair_serves = _one_pair_serves(setup.instances())
+    trapped, shares = 0.0, _InSolids()
+    if not one_pair_serves:
+        coarse = _coarse(setup, light)
+        for layers in (1, 2):
+            method.solids.set_layers(light, layers)
+            _, _, shares = _coarse_solve(method, device, coarse, coarse.lights[0], frame)
+            trapped = max(trapped, shares.trapped)
+    _decide_layers(method.solids, light, one_pair_serves, trapped, shares.entered)
+
+
+def _coarse(setup: FrameSetup, light: LightSetup) -> FrameSetup:
+    """The scene under this light alone, with coarse views."""
+    everything = setup.instances()
+    casters = points_of([i for i in everything if i.optical_kind is not OpticalKind.DIFFUSE])
+    caster = fit_view(
+        light.light, casters, COARSE_CASTER, depth_points_ws=points_of(everything), boxes_ws=boxes_of(everything)
+    )
+    coarse_light = replace(light, caster=caster, receivers=receiver_views(everything, light.light, COARSE_MAP))
+    options = {**setup.options, "march_steps": max(32, int(setup.options["march_steps"]))}
+    return replace(setup, options=options, lights=[coarse_light])
 
 
 def _core(
@@ -160,22 +179,6 @@ def _coarse_solve(
     return landed, {kind: flux / max(tried_flux, 1e-300) for kind, flux in shares.items()}, solids
 
 
-def receivers_inside_solids(everything: tuple[Instance, ...]) -> bool:
-    """Whether a triangle of an opaque surface reaches into the box of a solid: light may end in there."""
-    boxes = boxes_of(i for i in everything if i.optical_kind is OpticalKind.SOLID)
-    if len(boxes) == 0:
-        return False
-    for instance in everything:
-        if instance.optical_kind is OpticalKind.DIFFUSE:
-            corners = instance.positions_ws()[instance.mesh.triangles]
-            low, high = corners.min(axis=1), corners.max(axis=1)
-            for box in boxes:
-                air = 1e-4 * (box[1] - box[0])  # what stands on a floor, or is cut from the same grid, touches
-                if ((low < box[1] - air) & (high > box[0] + air)).all(axis=1).any():
-                    return True
-    return False
-
-
 def _one_pair_serves(everything: tuple[Instance, ...]) -> bool:
     """Whether there is at most one solid, and it is convex: light that leaves it meets no other."""
     solids = [i for i in everything if i.optical_kind is OpticalKind.SOLID]
@@ -183,7 +186,7 @@ def _one_pair_serves(everything: tuple[Instance, ...]) -> bool:
 
 
 def _decide_layers(
-    method: LightMapMethod, light: LightSetup, one_pair_serves: bool, trapped: float, entered: float
+    solids: SolidViews, light: LightSetup, one_pair_serves: bool, trapped: float, entered: float
 ) -> None:
     """`trapped`, `entered`: of the flux in solids, what finds no way out by one pair, and what enters another."""
     because = "the scene's only solid is convex"
@@ -193,7 +196,7 @@ def _decide_layers(
             f"and {100.0 * entered:.2g} % enters another"
         )
     layers = 2 if not one_pair_serves and max(trapped, entered) > LAYERED_SHARE else 1
-    method.set_layers(light, layers, because)
+    solids.set_layers(light, layers, because)
 
 
 def _window(

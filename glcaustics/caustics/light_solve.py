@@ -10,12 +10,12 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 import moderngl
-import numpy as np
 
-from glcaustics.caustics.branches import BRANCH_CODE, INTERFACE, REFLECT, SOLID, Branch, branches_of, solve_statistics
-from glcaustics.caustics.landing import fit_receivers, receivers_inside_solids
+from glcaustics.caustics.branches import BRANCH_CODE, INTERFACE, REFLECT, Branch, branches_of, solve_statistics
+from glcaustics.caustics.landing import fit_receivers
 from glcaustics.caustics.map_warp import SEGMENTS, TABLE_ROWS, MapWarp
 from glcaustics.caustics.method import CausticsMethod, irradiance_of
+from glcaustics.caustics.solid_views import SolidViews, receivers_inside_solids
 from glcaustics.gpu import Device, Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes import light_view
@@ -76,9 +76,7 @@ class LightMapMethod(CausticsMethod):
     def __init__(self) -> None:
         self._branches: dict[int, list[Branch]] = {}
         self._warps: dict[tuple[int, str], MapWarp] = {}
-        self._layers: dict[int, int] = {}
-        self._why_one_pair: dict[int, str] = {}
-        self._receivers_inside = False
+        self.solids = SolidViews()
         self._left_out: list[tuple[str, str]] = []
 
     @classmethod
@@ -138,7 +136,7 @@ class LightMapMethod(CausticsMethod):
 
     def prepare(self, device: Device, setup: FrameSetup, frame: FrameState) -> None:
         """Send a coarse light through the scene once, and fit each light's receiver views to where it lands."""
-        self._receivers_inside = receivers_inside_solids(setup.instances())
+        self.solids.receivers_inside = receivers_inside_solids(setup.instances())
         for light in setup.lights:
             if light.caster is not None:
                 shares, warps = fit_receivers(self, device, setup, light, frame)
@@ -160,15 +158,6 @@ class LightMapMethod(CausticsMethod):
     def branches(self, setup: FrameSetup, light: LightSetup) -> list[Branch]:
         """The branches that this light needs."""
         return self._branches.get(light.index, branches_of(setup, light, self.name))
-
-    def layers(self, light: LightSetup) -> int:
-        """Pairs of front and back faces by which this light's way through solids is followed: 1, or 2."""
-        return self._layers.get(light.index, 1)
-
-    def set_layers(self, light: LightSetup, layers: int, because: str = "") -> None:
-        """`because`: why one pair is enough."""
-        self._layers[light.index] = layers
-        self._why_one_pair[light.index] = because
 
     def leave_out(self, graph: FrameGraph, setup: FrameSetup, because: str) -> None:
         for light in setup.lights:
@@ -226,23 +215,13 @@ class LightMapMethod(CausticsMethod):
         for receiver in light.receivers.values():
             if any(branch.view == receiver.base for branch in branches):
                 light_view.declare_receiver(graph, setup, light, receiver)
-        if OpticalKind.SOLID in setup.kinds():
-            light_view.declare_caster_back(graph, setup, light)
-            if self.layers(light) == 2:
-                light_view.declare_caster_layers(graph, light)
-            else:
-                because = self._why_one_pair.get(light.index) or "a coarse light decides before the first frame"
-                graph.leave_out(f"caster_front2{light.resource('')}", because)
-        else:
-            graph.leave_out(f"caster_back{light.resource('')}", "nothing in the scene is a solid with two interfaces")
+        self.solids.declare(graph, setup, light)
         for branch in branches:
             self._declare_solve(graph, setup, light, branch)
 
     def _declare_solve(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, branch: Branch) -> None:
         assert light.caster is not None
         size = light.caster.size
-        behind = ("back", "front2", "back2") if self.layers(light) == 2 else ("back",)
-        back = tuple(light.resource(f"caster.{n}_{what}") for n in behind for what in ("position_ws", "normal_ws"))
         graph.add(
             PassDecl(
                 branch.pass_name("solve"),
@@ -253,7 +232,7 @@ class LightMapMethod(CausticsMethod):
                     light.resource("caster.normal_ws"),
                     light.resource(f"receiver.{branch.view}.position_ws"),
                     light.resource(f"receiver.{branch.view}.normal_ws"),
-                    *(back if branch.kind == SOLID else ()),
+                    *self.solids.reads(light, branch).values(),
                 ),
                 note=f"where {branch.words} light lands",
             )
@@ -271,8 +250,7 @@ class LightMapMethod(CausticsMethod):
                 "CASTER_FACES": light.caster.faces,
                 "RECEIVER_FACES": view.faces,
                 "BRANCH": BRANCH_CODE[branch.kind],
-                "LAYERS": self.layers(light) if branch.kind == SOLID else 1,
-                "RECEIVERS_INSIDE": int(branch.kind == SOLID and self._receivers_inside),
+                **self.solids.defines(light, branch),
                 "HAS_MIRROR": int(branch.kind == REFLECT and OpticalKind.MIRROR in ctx.setup.kinds()),
                 "REFLECTION_FOLLOWED": int(any(b.kind == REFLECT for b in self.branches(ctx.setup, light))),
                 "NAIVE_FLUX": int(options.get("naive_flux", False)),
@@ -285,21 +263,11 @@ class LightMapMethod(CausticsMethod):
             "t_receiver_position": f"receiver.{branch.view}.position_ws",
             "t_receiver_normal": f"receiver.{branch.view}.normal_ws",
         }
-        if branch.kind == SOLID:
-            for name in ("back", "front2", "back2") if self.layers(light) == 2 else ("back",):
-                textures |= {f"t_{name}_{n}": f"caster.{name}_{n}_ws" for n in ("position", "normal")}
-            solids = [item.bounds_ws for item in ctx.frame.gpu.select(OpticalKind.SOLID)]
-            program.set_all(
-                {
-                    "u_caster_min_ws": tuple(np.min([b[0] for b in solids], axis=0)),
-                    "u_caster_max_ws": tuple(np.max([b[1] for b in solids], axis=0)),
-                    "u_internal_bounces": int(options["internal_bounces"]),
-                }
-            )
         low, high = ctx.setup.scene_bounds_ws
         program.set_all(
             {
                 **{name: ctx.texture(light.resource(r)) for name, r in textures.items()},
+                **self.solids.uniforms(ctx, light, branch),
                 **light.caster.uniforms("caster"),
                 **view.uniforms("receiver"),
                 **light_uniforms(light.light),

@@ -19,11 +19,11 @@ LADDER: Mapping[str, Mapping[str, Any]] = {
         "denoise_passes": passes,
     }
     for quality, photons, caster, receiver, iterations, steps, view_steps, bounces, passes in (
-        ("draft", 1 << 16, 192, 256, 6, 16, 64, 0, 4),
-        ("low", 1 << 18, 384, 512, 8, 24, 96, 1, 4),
-        ("medium", 1 << 19, 768, 768, 10, 32, 160, 2, 5),
-        ("high", 1 << 20, 1024, 1024, 12, 48, 256, 4, 5),
-        ("reference", 1 << 22, 2048, 2048, 16, 96, 1024, 8, 5),
+        ("draft", 1 << 16, 192, 256, 6, 16, 64, 2, 4),
+        ("low", 1 << 18, 384, 512, 8, 24, 96, 4, 4),
+        ("medium", 1 << 19, 768, 768, 10, 32, 160, 16, 5),
+        ("high", 1 << 20, 1024, 1024, 12, 48, 256, 24, 5),
+        ("reference", 1 << 22, 2048, 2048, 16, 96, 1024, 32, 5),
     )
 }
 RANGES: Mapping[str, tuple[int, int]] = {

@@ -20,7 +20,6 @@ LOST = {
     -3: "unresolved",
     -4: "no_exit_found",
     -5: "absorbed",
-    -6: "normal_faces_away",
     -7: "met_another_specular_surface",
     -11: "scattered_between_facets",
     -12: "below_the_luminance_cutoff",

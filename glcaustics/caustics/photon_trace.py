@@ -10,20 +10,22 @@ of by chance (which is an option); solids, dispersion and absorption; every loss
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any, ClassVar
 
-import numpy as np
-
 from glcaustics.caustics import photon_options, photon_strata
-from glcaustics.caustics.branches import BRANCH_CODE, INTERFACE, REFLECT, SOLID, Branch, branches_of
+from glcaustics.caustics.branches import BRANCH_CODE, INTERFACE, REFLECT, Branch, branches_of
+from glcaustics.caustics.caustic_map import CausticMap
+from glcaustics.caustics.landing import fit_layers
 from glcaustics.caustics.method import IRRADIANCE, NOISY_IRRADIANCE, CausticsMethod
 from glcaustics.caustics.photon_stats import landing_of, photon_statistics
 from glcaustics.caustics.photon_strata import photon_grid, sequence
-from glcaustics.gpu import Program
+from glcaustics.caustics.solid_views import SolidViews, receivers_inside_solids
+from glcaustics.gpu import Device, Program
 from glcaustics.graph import FrameGraph, PassDecl, TextureDesc
 from glcaustics.passes import depth_chain, light_view
 from glcaustics.passes.context import PassContext
-from glcaustics.passes.frame import FrameSetup, LightSetup
+from glcaustics.passes.frame import FrameSetup, FrameState, LightSetup
 from glcaustics.passes.light_views import light_uniforms
 from glcaustics.passes.raster import raster_uniforms
 from glcaustics.passes.receiver_views import ReceiverView
@@ -51,10 +53,23 @@ class PhotonTrace(CausticsMethod):
 
     def __init__(self) -> None:
         self._traced: list[tuple[LightSetup, Branch]] = []
+        self._solids = SolidViews()
 
     @classmethod
     def validate(cls, options: Mapping[str, Any]) -> None:
         photon_options.check(options, cls.name)
+
+    def prepare(self, device: Device, setup: FrameSetup, frame: FrameState) -> None:
+        """Send the light maps' coarse light through solids once, to decide how many pairs of their faces are drawn."""
+        if OpticalKind.SOLID not in setup.kinds():
+            return
+        self._solids.receivers_inside = receivers_inside_solids(setup.instances())
+        solver = CausticMap()
+        solver.solids = self._solids
+        solve_setup = replace(setup, options={**solver.defaults, **setup.options})
+        for light in setup.lights:
+            if light.caster is not None:
+                fit_layers(solver, device, solve_setup, light, frame)
 
     # -- declaration --------------------------------------------------------------------------------------------------
 
@@ -102,16 +117,12 @@ class PhotonTrace(CausticsMethod):
                 depth_chain.declare_over(
                     graph, f"depth_chain.{receiver.name}", plane, receiver.view.size, light.resource("")
                 )
-        if any(branch.kind == SOLID for branch in branches):
-            light_view.declare_caster_back(graph, setup, light)
-        else:
-            graph.leave_out(f"caster_back{light.resource('')}", "nothing in the scene is a solid with two interfaces")
+        self._solids.declare(graph, setup, light)
 
     def _declare_trace(self, graph: FrameGraph, setup: FrameSetup, light: LightSetup, branch: Branch) -> None:
         assert light.caster is not None
         size = photon_grid(int(setup.options["photons"]), light.caster)
         mask = [branch.resource("landing_mask")] if in_stages(setup, branch) else []
-        back = (light.resource("caster.back_position_ws"), light.resource("caster.back_normal_ws"))
         graph.add(
             PassDecl(
                 branch.pass_name("trace"),
@@ -127,7 +138,7 @@ class PhotonTrace(CausticsMethod):
                     *_light_reads(light, branch, setup.options["march"]).values(),
                     "gbuffer.plane",
                     *_march_reads(setup).values(),
-                    *(back if branch.kind == SOLID else ()),
+                    *self._solids.reads(light, branch).values(),
                     *((photon_strata.strata_of(branch),) if photon_strata.is_adaptive(setup.options) else ()),
                 ),
                 always_writes=tuple(mask),
@@ -164,11 +175,12 @@ class PhotonTrace(CausticsMethod):
             "DDA": int(options["march"] == "dda"),
             "SIZED": int(light.light.has_size),
             "ROUGH": int(has_rough_casters(ctx.setup.instances())),
+            **self._solids.defines(light, branch),
+            "REFLECTION_FOLLOWED": int(any(at is light and b.kind == REFLECT for at, b in self._traced)),
             "HAS_MIRROR": int(branch.kind == REFLECT and OpticalKind.MIRROR in ctx.setup.kinds()),
         }
         program = ctx.device.program(f"{SHADERS}/trace", defines)
-        if branch.kind == SOLID:
-            program.set_all(self._solid_uniforms(ctx, light))
+        program.set_all(self._solids.uniforms(ctx, light, branch))
         if branch.kind == REFLECT:
             program.set(u_receiver_raster_from_world=view.raster_from_world())
         if photon_strata.is_adaptive(options):
@@ -204,17 +216,6 @@ class PhotonTrace(CausticsMethod):
             }
         )
         return program
-
-    @staticmethod
-    def _solid_uniforms(ctx: PassContext, light: LightSetup) -> dict[str, Any]:
-        solids = [item.bounds_ws for item in ctx.frame.gpu.select(OpticalKind.SOLID)]
-        return {
-            "t_back_position": ctx.texture(light.resource("caster.back_position_ws")),
-            "t_back_normal": ctx.texture(light.resource("caster.back_normal_ws")),
-            "u_caster_min_ws": tuple(np.min([b[0] for b in solids], axis=0)),
-            "u_caster_max_ws": tuple(np.max([b[1] for b in solids], axis=0)),
-            "u_internal_bounces": int(ctx.setup.options["internal_bounces"]),
-        }
 
     def _scatter(self, ctx: PassContext, output: str) -> None:
         target = ctx.target(output)

@@ -52,3 +52,10 @@ vec3 glc_safe_normalize(vec3 v, vec3 fallback) {
     float l2 = dot(v, v);
     return l2 > 0.0 ? v * inversesqrt(l2) : fallback;
 }
+
+// A surface's normal as light meets it: unit, against d. At a silhouette an interpolated normal can turn away from the light that its
+// triangle sees: there the light grazes it. n: unit normal; d: unit direction of travel.
+vec3 glc_met_normal(vec3 n, vec3 d) {
+    const float grazing = 0.02;   // least cosine between normal and light
+    return glc_safe_normalize(n - d * max(grazing + dot(n, d), 0.0), -d);
+}

@@ -76,29 +76,3 @@ int glc_meet_from_inside(vec3 n, float ior, float alpha, vec2 xi, inout vec3 ray
 vec3 glc_back_normal(sampler2D t_back_normal, GlcView view, GlcHit exit) {
     return -glc_safe_normalize(textureLod(t_back_normal, glc_view_project(view, exit.position_ws).xy / view.size, 0.0).xyz, exit.normal_ws);
 }
-
-// From the first interface to beyond the last one: p and ray are moved there, flux is what is left, iterations the look-ups.
-// bounces: total reflections that are followed. Returns 0, or why the light is lost. alpha, xi: see glc_meet_from_inside.
-int glc_pass_rough_solid(sampler2D t_front, sampler2D t_front_normal, sampler2D t_back, sampler2D t_back_normal, GlcView view,
-                         vec3 box_min, vec3 box_max, vec3 sigma_a, float ior, int estimate, int max_iterations, int march_steps,
-                         int bounces, float alpha, vec2 xi, inout vec3 p, inout vec3 ray, inout vec3 flux, inout float iterations) {
-    float t_max = glc_box_exit(p, ray, box_min, box_max);
-    GlcHit exit = glc_intersect(t_back, t_back_normal, view, p, ray, t_max, estimate, max_iterations, 0);
-    iterations += float(exit.iterations);
-    for (int bounce = 0; bounce <= bounces; ++bounce) {
-        if (exit.status <= 0) {
-            exit = glc_leave_inside(t_front, t_front_normal, t_back, t_back_normal, view, p, ray, t_max, march_steps);
-            iterations += float(exit.iterations);
-            if (exit.status <= 0) return GLC_NO_EXIT;
-        }
-        flux *= glc_transmittance(sigma_a, exit.t);
-        vec3 n = bounce == 0 ? glc_back_normal(t_back_normal, view, exit) : -exit.normal_ws;
-        if (dot(n, ray) > 0.0) n = -n;
-        p = exit.position_ws;
-        int met = glc_meet_from_inside(n, ior, alpha, fract(xi + float(bounce) * vec2(0.61803399, 0.41421356)), ray, flux);
-        if (met != GLC_STAYS) return met;
-        t_max = glc_box_exit(p, ray, box_min, box_max);
-        exit.status = 0;
-    }
-    return GLC_TIR;
-}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from glcaustics.caustics.landing import receivers_inside_solids
+from glcaustics.caustics.solid_views import receivers_inside_solids
 from glcaustics.passes.receiver_views import points_under
 from glcaustics.scene.model import Instance
 from tests.gpu.feature_scenes import GLASS, WHITE, box_mesh, plane, translation

@@ -25,9 +25,6 @@ uniform vec3 u_bounds_max_ws;
 #if BRANCH == GLC_IN_AND_OUT
 uniform sampler2D t_back_position;
 uniform sampler2D t_back_normal;
-uniform vec3 u_caster_min_ws;      // box around the solids
-uniform vec3 u_caster_max_ws;
-uniform int u_internal_bounces;
 #endif
 uniform vec3 u_channels;           // 1 for the colour channels that this branch carries, else 0
 uniform int u_channel;             // channel whose index of refraction is used
@@ -41,12 +38,15 @@ layout(location = 0) out vec4 o_landing;  // xy: pixel; z: 1 / area of the recei
 layout(location = 1) out vec4 o_flux;     // rgb: flux (carried, or lost when status < 0), W or lm; w: look-ups
 
 #define PHOTON_DARK -5
-#define PHOTON_AVERTED -6
 #define PHOTON_SECOND_HIT -7
 #define PHOTON_DIM -12
 #define PHOTON_ROUGH -13
 const float STEEPEST = 8.0;        // largest weight of a jittered light point (see below)
 const int ESTIMATE = GLC_HYBRID;
+
+#if BRANCH == GLC_IN_AND_OUT
+#include "caustics/shared/solid_way.glsl"
+#endif
 
 float photon_luminance(vec3 flux) {
     return dot(flux, vec3(0.2126, 0.7152, 0.0722));
@@ -84,15 +84,10 @@ void trace() {
     vec3 p = start.position_ws;
     vec3 d = glc_light_direction(caster_view, p);
     bool from_dense = object.kind == GLC_INTERFACE && start.side < 0.0;
-    vec3 n = start.normal_ws * (start.side < 0.0 ? -1.0 : 1.0);
+    vec3 n = glc_met_normal(start.normal_ws * (start.side < 0.0 ? -1.0 : 1.0), d);
     float n_dot_l = -dot(n, d);
     vec3 flux = stratum_flux(caster_view, p, d) * u_channels / density;
     if (max(flux.r, max(flux.g, flux.b)) <= 0.0) return;   // outside of a spot's cone
-    if (n_dot_l <= 0.0) {
-        o_landing.w = float(PHOTON_AVERTED);
-        o_flux.rgb = BRANCH == GLC_REFLECT && object.kind != GLC_MIRROR ? vec3(0.0) : flux;   // counted once, where it would go through
-        return;
-    }
     float light_luminance = photon_luminance(flux) / (u_light.w == 0.0 ? 1.0 : glc_light_cone(d));
 #if SIZED
     // The photon starts where the light's centre sees the caster, and comes from another point of the light. At grazing incidence the
@@ -125,6 +120,7 @@ void trace() {
     if (is_reflected != (BRANCH == GLC_REFLECT)) return;
     flux /= is_reflected ? chance : 1.0 - chance;
 #endif
+    vec3 arriving = flux;
     flux *= BRANCH == GLC_REFLECT ? reflected : vec3(transmitted);
     bool is_rough = object.roughness > u_roughness_cutoff;
     if (is_rough || photon_luminance(flux) < u_luminance_cutoff * light_luminance) {
@@ -137,7 +133,13 @@ void trace() {
 #if BRANCH == GLC_REFLECT
     bool in_absorber = from_dense;
 #else
-    if (!glc_refract(d, n, eta, ray)) { o_landing.w = float(GLC_TIR); o_flux.rgb = flux; return; }
+    if (!glc_refract(d, n, eta, ray)) {
+#if !REFLECTION_FOLLOWED   // else another branch carries it
+        o_landing.w = float(GLC_TIR);
+        o_flux.rgb = arriving;
+#endif
+        return;
+    }
     bool in_absorber = object.kind == GLC_INTERFACE && !from_dense;
 #endif
 #if ROUGH
@@ -148,11 +150,14 @@ void trace() {
     }
 #endif
 #if BRANCH == GLC_IN_AND_OUT
-    int lost = glc_pass_rough_solid(t_caster_position, t_caster_normal, t_back_position, t_back_normal, caster_view, u_caster_min_ws,
-                                    u_caster_max_ws, object.sigma_a, ior, ESTIMATE, u_max_iterations, u_march_steps,
-                                    u_internal_bounces, ROUGH == 1 ? alpha : 0.0, glc_cell_point(cell, u_frame, u_seed, 2), p, ray,
-                                    flux, iterations);
-    if (lost != 0) { o_landing.w = float(lost); o_flux = vec4(flux, iterations); return; }
+    SolidWay way = SolidWay(p, ray, flux, float(start.object + 1), object.sigma_a, ior, alpha, glc_cell_point(cell, u_frame, u_seed, 2),
+                            0, 0, 0.0, GlcHit(0.0, p, -ray, 0, GLC_LEFT));
+    int passed = pass_solids(caster_view, glc_receiver_view(), way);
+    p = way.p_ws;
+    ray = way.ray;
+    flux = way.flux;
+    iterations = way.iterations;
+    if (passed < 0) { o_landing.w = float(passed); o_flux = vec4(flux, iterations); return; }
 #endif
     if (max(flux.r, max(flux.g, flux.b)) <= 0.0) { o_landing.w = float(PHOTON_DARK); return; }
 
@@ -162,8 +167,14 @@ void trace() {
     PhotonLanding landing = photon_land_reflected(p, ray, t_max);
 #else
     GlcView receiver_view = glc_receiver_view();
-    GlcHit hit = glc_intersect(t_receiver_position, t_receiver_normal, receiver_view, p, ray, t_max, ESTIMATE, u_max_iterations,
-                               FIRST == 1 ? 0 : u_march_steps);
+    GlcHit hit;
+#if BRANCH == GLC_IN_AND_OUT && (LAYERS == 2 || RECEIVERS_INSIDE)
+    hit = way.landed;
+    p = passed == GLC_LANDED ? hit.position_ws - hit.t * ray : p;
+    if (passed != GLC_LANDED)
+#endif
+    hit = glc_intersect(t_receiver_position, t_receiver_normal, receiver_view, p, ray, t_max, ESTIMATE, u_max_iterations,
+                        FIRST == 1 ? 0 : u_march_steps);
     float slack_m = 0.5 * glc_texel_width(receiver_view, hit.status > 0 ? hit.position_ws : p);
     PhotonLanding landing = photon_land(p, ray, hit, slack_m, t_max);
     iterations += float(hit.iterations);

@@ -1,5 +1,6 @@
 // Light's way through solids, from the first interface until it is in the open for good. LAYERS 1: one pair of front and back faces, and
 // one solid. LAYERS 2: two pairs, and on through other parts and other solids. RECEIVERS_INSIDE 1: opaque surfaces may lie in solids.
+// ROUGH 1: surfaces may scatter the light (GGX).
 #include "common/solid_path.glsl"
 #if LAYERS == 2
 #include "caustics/shared/solid_layers.glsl"
@@ -24,6 +25,8 @@ struct SolidWay {
     float object;      // number + 1 of the solid that it is in
     vec3 sigma_a;      // of that solid, 1/m
     float ior;
+    float alpha;       // of its surface (brdf.glsl); 0: smooth
+    vec2 xi;           // in [0, 1), for the facet that is met next; drawn afresh there
     int reflections;   // total reflections so far
     int solids;        // entered after the first
     float iterations;
@@ -50,6 +53,45 @@ GlcHit solid_exit(GlcView view, SolidWay way, bool first, float t_max) {
     return exit;
 }
 
+// Light inside meets the surface of unit normal n, against the ray. Returns as glc_meet_from_inside.
+int meet_from_inside(vec3 n, inout SolidWay way) {
+#if ROUGH
+    vec2 xi = way.xi;
+    way.xi = fract(xi + vec2(0.61803399, 0.41421356));
+    return glc_meet_from_inside(n, way.ior, way.alpha, xi, way.ray, way.flux);
+#else
+    return glc_meet_from_inside(n, way.ior, 0.0, vec2(0.0), way.ray, way.flux);
+#endif
+}
+
+#if LAYERS == 2
+// Light in the open goes into another solid, its number + 1, through a surface of unit normal n, against the ray. False: it is lost
+// between facets.
+bool go_into(float object, vec3 n, inout SolidWay way) {
+    GlcObject next = glc_object(int(object + 0.5) - 1);
+    vec3 facet = n;
+    way.object = object;
+    way.sigma_a = next.sigma_a;
+    way.ior = next.ior[u_channel];
+    ++way.solids;
+#if ROUGH
+    way.alpha = next.roughness * next.roughness;
+    if (way.alpha > 0.0) facet = glc_ggx_visible_normal(n, -way.ray, way.alpha, way.xi);
+    way.xi = fract(way.xi + vec2(0.61803399, 0.41421356));
+#endif
+    way.flux *= (1.0 - glc_fresnel_dielectric(-dot(facet, way.ray), way.ior)) * next.transmission;
+    glc_refract(way.ray, facet, way.ior, way.ray);
+#if ROUGH
+    if (way.alpha > 0.0) {
+        float cos_in = -dot(way.ray, n);
+        if (cos_in <= 0.0) return false;
+        way.flux *= glc_ggx_visible_share(cos_in, way.alpha);
+    }
+#endif
+    return true;
+}
+#endif
+
 // Whether the light lands on an opaque surface before it has gone t metres, the end of its way in or between solids. `touches`: that
 // surface lies just behind the end, within a texel; then the light leaves the solid first.
 bool lands_within(GlcView view, GlcView receiver_view, float t, inout SolidWay way, out bool touches) {
@@ -58,6 +100,12 @@ bool lands_within(GlcView view, GlcView receiver_view, float t, inout SolidWay w
     way.iterations += float(way.landed.iterations);
     touches = way.landed.status > 0 && way.landed.t >= t;
     return way.landed.status > 0 && way.landed.t < t;
+}
+
+// Where the solid touches a receiver, rounding may have put the exit behind it.
+int in_the_open(GlcView view, inout SolidWay way) {
+    way.p_ws -= way.ray * glc_texel_width(view, way.p_ws);
+    return 0;
 }
 
 // Returns 0: in the open, to where nothing but receivers is met; GLC_LANDED; or why the light is lost.
@@ -75,7 +123,7 @@ int pass_solids(GlcView view, GlcView receiver_view, inout SolidWay way) {
 #endif
         way.iterations += float(end.iterations);
         bool found = end.status > 0;
-        if (!inside && !found) return 0;
+        if (!inside && !found) return in_the_open(view, way);
         bool touches = false;
 #if LAYERS == 2 || RECEIVERS_INSIDE
         if ((RECEIVERS_INSIDE == 1 || !inside) && lands_within(view, receiver_view, found ? end.t : t_max, way, touches)) {
@@ -89,21 +137,19 @@ int pass_solids(GlcView view, GlcView receiver_view, inout SolidWay way) {
         way.p_ws = end.position_ws;
         if (inside) {
             way.flux *= glc_transmittance(way.sigma_a, end.t);
-            inside = glc_meet_from_inside(n, way.ior, 0.0, vec2(0.0), way.ray, way.flux) == GLC_STAYS;
+            int met = meet_from_inside(n, way);
+#if ROUGH
+            if (met == GLC_BETWEEN_FACETS) return met;
+#endif
+            inside = met == GLC_STAYS;
             if (inside && left_reflections-- == 0) return GLC_TIR;
             if (inside) ++way.reflections;
             else if (touches) return GLC_LANDED;
-            else if (way.solids == MORE_SOLIDS) return 0;
+            else if (way.solids == MORE_SOLIDS) return in_the_open(view, way);
         }
 #if LAYERS == 2
         else {
-            GlcObject next = glc_object(int(object + 0.5) - 1);
-            way.flux *= (1.0 - glc_fresnel_dielectric(-dot(n, way.ray), next.ior[u_channel])) * next.transmission;
-            glc_refract(way.ray, n, next.ior[u_channel], way.ray);
-            way.object = object;
-            way.sigma_a = next.sigma_a;
-            way.ior = next.ior[u_channel];
-            ++way.solids;
+            if (!go_into(object, n, way)) return GLC_BETWEEN_FACETS;
             left_reflections = u_internal_bounces;
             inside = true;
         }

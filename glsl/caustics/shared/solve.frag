@@ -4,6 +4,7 @@
 //
 // Flux of a texel: exact, E_perp x cross-section or I x solid angle. NAIVE_FLUX 1 is their eq. 6, N.L / V, the baseline.
 // BRANCH: GLC_REFLECT, GLC_THROUGH (an open interface) or GLC_IN_AND_OUT (a solid's two).
+#define ROUGH 0   // all surfaces are taken for smooth
 #define GLC_REFLECT 0
 #define GLC_THROUGH 1
 #define GLC_IN_AND_OUT 2
@@ -42,8 +43,6 @@ layout(location = 1) out vec4 o_flux;     // rgb: flux (carried, or lost when st
 #define GLC_DARK -5
 #define GLC_SECOND_HIT -7
 
-const float GRAZING = 0.02;   // least cosine between normal and light
-
 vec3 texel_flux(GlcView view, vec3 p_ws, vec3 d, float n_dot_l) {
 #if NAIVE_FLUX
     return u_light_intensity * u_caster_area_m2 * n_dot_l * u_inverse_texels;
@@ -73,9 +72,7 @@ void main() {
 
     // The side the light is on decides which medium it comes from.
     bool from_dense = object.kind == GLC_INTERFACE && stored_normal.w < 0.0;
-    vec3 n = stored_normal.xyz * (stored_normal.w < 0.0 ? -1.0 : 1.0);
-    // At a silhouette an interpolated normal can turn away from the light that its triangle sees: there the light grazes it.
-    n = glc_safe_normalize(n - d * max(GRAZING + dot(n, d), 0.0), -d);
+    vec3 n = glc_met_normal(stored_normal.xyz * (stored_normal.w < 0.0 ? -1.0 : 1.0), d);
     float n_dot_l = -dot(n, d);
     vec3 flux = texel_flux(caster_view, p, d, max(n_dot_l, 0.0)) * u_channels;
     float ior = object.ior[u_channel];
@@ -101,7 +98,7 @@ void main() {
     flux *= transmitted_share;
     bool in_absorber = object.kind == GLC_INTERFACE && !from_dense;
 #if BRANCH == GLC_IN_AND_OUT
-    SolidWay way = SolidWay(p, ray, flux, caster.w, object.sigma_a, ior, 0, 0, 0.0, GlcHit(0.0, p, -ray, 0, GLC_LEFT));
+    SolidWay way = SolidWay(p, ray, flux, caster.w, object.sigma_a, ior, 0.0, vec2(0.0), 0, 0, 0.0, GlcHit(0.0, p, -ray, 0, GLC_LEFT));
     int passed = pass_solids(caster_view, receiver_view, way);
     p = way.p_ws;
     ray = way.ray;
@@ -117,8 +114,6 @@ void main() {
     GlcHit hit = GlcHit(0.0, p, -ray, 0, GLC_LEFT);
 #if BRANCH == GLC_IN_AND_OUT
     hit = way.landed;
-    // Where the solid touches a receiver, rounding may have put the exit behind it.
-    if (passed != GLC_LANDED) p -= ray * glc_texel_width(caster_view, p);
     if (passed != GLC_LANDED)
 #endif
     if (t_max > 0.0) {
