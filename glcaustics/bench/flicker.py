@@ -58,10 +58,9 @@ def pan_flicker(scene: Scene, plan: FlickerPlan, backend: str) -> dict[str, Any]
     points, rows = _followed(positions[last], cameras[last]), []
     inner = points[:, _off_edges(points, positions[last])]
     for name, frames in stacks.items():
+        everywhere, off_edges = (metrics.surface_flicker(frames[last], each) for each in (points, inner))
         rmse = None if halves is None else _rmse(halves, frames[_views(plan)])
-        flicker = {"flicker": metrics.surface_flicker(frames[last], points)}
-        flicker["off_edges"] = metrics.surface_flicker(frames[last], inner)
-        rows.append({"name": name, **flicker, "rmse": rmse})
+        rows.append({"name": name, "flicker": everywhere, "off_edges": off_edges, "rmse": rmse})
     return {
         "rows": rows,
         "points": points.shape[1],

@@ -176,9 +176,10 @@ def _flicker_table(one: Mapping[str, Any]) -> Table:
         rows.append([*cells, "" if r["rmse"] is None else f"{r['rmse']:.3f}"])
     width, height = p["size"]
     note = (
-        f"{width}x{height}, {p['photons']} photons, {found['motion_px']:.2f} px a frame over still light; the last "
-        f"{p['shown']} of {p['frames']} frames at {found['points']} points of the surfaces, {found['points_off_edges']} without edges; "
-        f"plain: of the same frames, unfiltered, alpha 0.2; rel. RMSE at {p['reference_views']} views against {p['reference_frames']} frames of "
+        f"{width}x{height}, {p['photons']} photons, {found['motion_px']:.2f} px a frame over still light; "
+        f"the last {p['shown']} of {p['frames']} frames at {found['points']} points of the surfaces, "
+        f"{found['points_off_edges']} without edges; plain: of the same frames, unfiltered, alpha 0.2; "
+        f"rel. RMSE at {p['reference_views']} views against {p['reference_frames']} frames of "
         f"{p['reference_photons']} photons ({found['reference_seconds']:.0f} s)"
     )
     head = ("irradiance", "flicker", "without edges", "rel. RMSE")
