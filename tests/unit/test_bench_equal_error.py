@@ -134,7 +134,7 @@ def photons(rrmse: float, flip: float, share: float, tracing_ms: float, flicker:
         ({"flip": 0.06}, {"FLIP of the picture"}),
         ({"share": 0.99}, {"hits as pixel by pixel"}),
         ({"tracing_ms": 6.0}, {"tracing over dda's", "largest stage"}),
-        ({"flicker": 0.026}, {"flicker of the filter over a plain exponential mean's"}),
+        ({"flicker": 0.026}, {"the filter's over a plain exponential mean's"}),
     ],
 )
 def test_marks_of_the_flooded_box(changed: dict[str, float], failed: set[str]) -> None:
