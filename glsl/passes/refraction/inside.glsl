@@ -21,12 +21,11 @@ const Ending NO_ENDING = Ending(false, true, GlcSolve(0.0, 0.0, vec2(0.0), 1e6, 
 const float TOUCHES_RELATIVE = 2e-5, TOUCHES_PIXELS = 1.0;
 const float BEYOND_PX = 2.0;   // of way beyond the exit, to meet what lies on it
 
-// Whether a point u of the ray lies within the solid, as far as the back faces tell that are stored where it is seen (beyond the
-// picture: at its border, as planes); unseen: what to say where something hides the solid. plane: of what is met; touches: it lies on
-// that face.
-bool before_far(sampler2D t_far, vec4 plane, GlcRasterRay ray, float u, bool unseen, out bool touches) {
+// Whether a point u of the ray lies within the solid, as far as the back faces of a texel tell, as planes; unseen: what to say where
+// something hides the solid. plane: of what is met; touches: it lies on that face.
+bool before_far(sampler2D t_far, vec2 texel, vec4 plane, GlcRasterRay ray, float u, bool unseen, out bool touches) {
     vec3 at = ray.start + u * ray.step;
-    vec4 far = texelFetch(t_far, ivec2(clamp(at.xy, vec2(0.0), u_raster_size - 0.001)), 0);
+    vec4 far = texelFetch(t_far, ivec2(texel), 0);
     float gap = at.z - far.z - dot(far.xy, at.xy), room = TOUCHES_RELATIVE * abs(at.z) + TOUCHES_PIXELS * max(length(far.xy), length(plane.xy));
     touches = far.w > 0.0 && abs(gap) <= room;
     return far.w > 0.0 ? gap >= -room : unseen;
@@ -78,7 +77,8 @@ Ending ending_of(GlcRasterRay ray, sampler2D t_far, float u_exit, bool found) {
     if (ending.solve.status == GLC_SOLVE_HIDDEN) ending.px = last.px;
     meets = hit || (last.meets && ending.solve.status != GLC_SOLVE_NOTHING);
 #endif
-    bool before = before_far(t_far, plane, ray, ending.u, !hit || ending.status == GLC_VIEW_SECOND, touches);
+    vec2 texel = hit ? ending.solve.texel : clamp(ray.start.xy + ending.u * ray.step.xy, vec2(0.0), u_raster_size - 0.001);
+    bool before = before_far(t_far, texel, plane, ray, ending.u, !hit || ending.status == GLC_VIEW_SECOND, touches);
     ending.ends = meets && (found ? ending.u <= u_exit || touches : before);
 #if !FINAL && !BEHIND
     float to = ending.ends ? ending.u : way;
