@@ -82,12 +82,22 @@ GlcHit glc_intersect_march(sampler2D t_position, sampler2D t_normal, GlcView vie
     GlcHit hit = GlcHit(0.0, o, -d, 0, GLC_LEFT);
     float t_front = 0.0;
     bool in_front = true;
-    for (int i = 1; i <= steps; ++i) {
-        float t = t_max * float(i) / float(steps);
-        GlcProbe probe = glc_probe(t_position, view, o + t * d, t_max);
-        hit.iterations += 1;
-        if (probe.gap > 0.0) { t_front = t; in_front = true; continue; }
-        if (!in_front) continue;
+    int i = 0;
+    while (i < steps) {
+        // Up to the next crossing: a loop of its own, since what is behind a branch within it may cost as if it were taken.
+        float t = 0.0;
+        GlcProbe probe;
+        bool crosses = false;
+        while (i < steps && !crosses) {
+            ++i;
+            t = t_max * float(i) / float(steps);
+            probe = glc_probe(t_position, view, o + t * d, t_max);
+            hit.iterations += 1;
+            bool before = probe.gap > 0.0;
+            crosses = in_front && !before;
+            if (before) { t_front = t; in_front = true; }
+        }
+        if (!crosses) break;
         float lo = t_front, hi = t;
         for (int k = 0; k < 10; ++k) {
             float mid = 0.5 * (lo + hi);

@@ -20,37 +20,39 @@ GlcHit glc_leave_inside(sampler2D t_front, sampler2D t_front_normal, sampler2D t
     GlcHit hit = GlcHit(0.0, o, -d, 0, GLC_LEFT);
     t_max += 4.0 * glc_texel_width(view, o);   // where the solid fills its box, a texel still counts as inside at the box's face
     float t_in = 0.0;
-    bool entered = false;
-    for (int i = 1; i <= march_steps; ++i) {
-        float t = t_max * float(i) / float(march_steps);
-        GlcProbe front = glc_probe(t_front, view, o + t * d, -t_max);
-        GlcProbe back = glc_probe(t_back, view, o + t * d, -t_max);
+    bool ends = false;
+    float t = 0.0;
+    GlcProbe front, back;
+    for (int i = 1; i <= march_steps && !ends; ++i) {
+        t = t_max * float(i) / float(march_steps);
+        front = glc_probe(t_front, view, o + t * d, -t_max);
+        back = glc_probe(t_back, view, o + t * d, -t_max);
         hit.iterations += 2;
         bool inside = front.valid && back.valid && front.gap <= 0.0 && back.gap >= 0.0;
-        if (inside) { t_in = t; entered = true; continue; }
-        if (!entered && i < 2) continue;  // the first step may still graze the surface that the ray comes from
-        float lo = t_in, hi = t;
-        bool through_front = false;
-        GlcProbe last = back;
-        for (int k = 0; k < 10; ++k) {
-            float mid = 0.5 * (lo + hi);
-            front = glc_probe(t_front, view, o + mid * d, -t_max);
-            back = glc_probe(t_back, view, o + mid * d, -t_max);
-            if (!front.valid || !back.valid) { hi = mid; continue; }
-            through_front = -front.gap < back.gap;
-            last = through_front ? front : back;
-            if (front.gap <= 0.0 && back.gap >= 0.0) lo = mid; else hi = mid;
-        }
-        hit.iterations += 20;
-        hit.t = hi;
-        bool settled = false;
-        if (last.valid) {
-            if (through_front) settled = glc_settle(glc_probe_normal(t_front_normal, last, d), view, last, o, d, 2.0 * GLC_REACH, hit);
-            else settled = glc_settle(glc_probe_normal(t_back_normal, last, d), view, last, o, d, 2.0 * GLC_REACH, hit);
-        }
-        if (settled) hit.status = GLC_BRACKETED;
-        return hit;
+        ends = !inside && (t_in > 0.0 || i > 1);  // the first step may still graze the surface that the ray comes from
+        t_in = inside ? t : t_in;
     }
+    if (!ends) return hit;
+    float lo = t_in, hi = t;
+    bool through_front = false;
+    GlcProbe last = back;
+    for (int k = 0; k < 10; ++k) {
+        float mid = 0.5 * (lo + hi);
+        front = glc_probe(t_front, view, o + mid * d, -t_max);
+        back = glc_probe(t_back, view, o + mid * d, -t_max);
+        if (!front.valid || !back.valid) { hi = mid; continue; }
+        through_front = -front.gap < back.gap;
+        last = through_front ? front : back;
+        if (front.gap <= 0.0 && back.gap >= 0.0) lo = mid; else hi = mid;
+    }
+    hit.iterations += 20;
+    hit.t = hi;
+    bool settled = false;
+    if (last.valid) {
+        if (through_front) settled = glc_settle(glc_probe_normal(t_front_normal, last, d), view, last, o, d, 2.0 * GLC_REACH, hit);
+        else settled = glc_settle(glc_probe_normal(t_back_normal, last, d), view, last, o, d, 2.0 * GLC_REACH, hit);
+    }
+    if (settled) hit.status = GLC_BRACKETED;
     return hit;
 }
 

@@ -74,11 +74,19 @@ GlcHit leave_layers(GlcView view, float object, vec3 o, vec3 d, float t_max, int
     t_max += 4.0 * glc_texel_width(view, o);
     float t_in = 0.0;
     bool entered = true;   // the ray starts on a face, from there inwards
-    for (int i = 1; i <= march_steps; ++i) {
-        float t = t_max * float(i) / float(march_steps);
-        hit.iterations += 4;
-        if (layers_at(view, o + t * d, object).inside) { t_in = t; entered = true; continue; }
-        if (!entered || i < 2) continue;  // the first step may still graze the surface that the ray comes from
+    int i = 0;
+    while (i < march_steps) {
+        float t = 0.0;
+        bool ends = false;
+        while (i < march_steps && !ends) {
+            ++i;
+            t = t_max * float(i) / float(march_steps);
+            hit.iterations += 4;
+            bool inside = layers_at(view, o + t * d, object).inside;
+            ends = entered && !inside && i > 1;  // the first step may still graze the surface that the ray comes from
+            if (inside) { t_in = t; entered = true; }
+        }
+        if (!ends) break;
         float lo = t_in, hi = t;
         for (int k = 0; k < 10; ++k) {
             float mid = 0.5 * (lo + hi);
