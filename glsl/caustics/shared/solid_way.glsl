@@ -5,6 +5,9 @@
 #if LAYERS == 2
 #include "caustics/shared/solid_layers.glsl"
 #endif
+#if ROUGH
+#include "common/sampling.glsl"
+#endif
 
 uniform vec3 u_caster_min_ws;      // box around the solids
 uniform vec3 u_caster_max_ws;
@@ -53,12 +56,19 @@ GlcHit solid_exit(GlcView view, SolidWay way, bool first, float t_max) {
     return exit;
 }
 
+#if ROUGH
+// Two numbers in [0, 1) for the facet that is met now. The next ones are hashed: shifted copies would tie each lobe to the one before.
+vec2 next_facet(inout SolidWay way) {
+    vec2 xi = way.xi;
+    way.xi = glc_unit_floats(glc_pcg3d(uvec3(floatBitsToUint(xi), 1u))).xy;
+    return xi;
+}
+#endif
+
 // Light inside meets the surface of unit normal n, against the ray. Returns as glc_meet_from_inside.
 int meet_from_inside(vec3 n, inout SolidWay way) {
 #if ROUGH
-    vec2 xi = way.xi;
-    way.xi = fract(xi + vec2(0.61803399, 0.41421356));
-    return glc_meet_from_inside(n, way.ior, way.alpha, xi, way.ray, way.flux);
+    return glc_meet_from_inside(n, way.ior, way.alpha, next_facet(way), way.ray, way.flux);
 #else
     return glc_meet_from_inside(n, way.ior, 0.0, vec2(0.0), way.ray, way.flux);
 #endif
@@ -76,8 +86,8 @@ bool go_into(float object, vec3 n, inout SolidWay way) {
     ++way.solids;
 #if ROUGH
     way.alpha = next.roughness * next.roughness;
-    if (way.alpha > 0.0) facet = glc_ggx_visible_normal(n, -way.ray, way.alpha, way.xi);
-    way.xi = fract(way.xi + vec2(0.61803399, 0.41421356));
+    vec2 xi = next_facet(way);
+    if (way.alpha > 0.0) facet = glc_ggx_visible_normal(n, -way.ray, way.alpha, xi);
 #endif
     way.flux *= (1.0 - glc_fresnel_dielectric(-dot(facet, way.ray), way.ior)) * next.transmission;
     glc_refract(way.ray, facet, way.ior, way.ray);
