@@ -72,8 +72,9 @@ def basin(body: Instance, eye: tuple[float, float, float] = (0.3, 1.6, 1.1), **v
     return scene_of([plane("floor", 1.2, -1.0, GLOW), *walls, block, body], [sun(0.0, 1e-3)], camera, sky=BLACK)
 
 
-@pytest.mark.parametrize(("half", "bottom"), [(1.05, -1.1), (1.05, -1.0), (1.0, -1.0)])
-@pytest.mark.parametrize("layers", [1, 2])
+@pytest.mark.parametrize(
+    ("half", "bottom", "layers"), [(1.05, -1.1, 1), (1.05, -1.0, 1), (1.0, -1.0, 1), (1.05, -1.1, 2)]
+)
 def test_a_closed_body_of_water_shows_what_an_open_sheet_does(half: float, bottom: float, layers: int) -> None:
     closed, sheet_scene = basin(water(half, bottom)), basin(water(half, None))
     assert holds_opaque(closed.instances) and not holds_opaque(sheet_scene.instances)
@@ -202,6 +203,30 @@ def test_a_cube_in_a_ball(layers: int) -> None:
     np.testing.assert_allclose(np.percentile(ratio, (5, 50, 95)), 1.0, rtol=0.02)
 
 
+def test_the_second_layer_shows_what_another_thing_in_the_block_hides() -> None:
+    """Of a back plate, what the eye would not see past a front one without the glass: bent rays come past it."""
+    parts = [
+        box("block", (4.0, 4.0, 1.2), (0.0, 0.0, 0.0), GREEN),
+        box("front", (0.4, 0.4, 0.02), (0.0, 0.0, 0.29), STONE),
+        box("back", (2.6, 2.6, 0.1), (0.0, 0.0, -0.35), GLOW),
+    ]
+    camera = Camera.look_at((1.8, 0.8, 3.0), (0.0, 0.0, -0.1), yfov_rad=0.35)
+    scene, path = scene_of(parts, [sun(0.0, 1e-3)], camera, sky=BLACK), Path(camera)
+    path.to_plane(Z, 0.6)
+    path.refract(Z, 1.0, N_GLASS)
+    path.to_plane(Z, 0.3, GREEN.sigma_a)
+    past = (np.abs(path.p[..., :2]) > 0.22).any(axis=2)
+    path.to_plane(Z, -0.3, GREEN.sigma_a)
+    path.share = path.share / N_GLASS**2
+    straight = camera.position_ws + (path.p - camera.position_ws) * (2.7 / (3.0 - path.p[..., 2:]))
+    hidden = past & (np.abs(straight[..., :2]) < 0.18).all(axis=2)
+    one, two = look(scene), look(scene, depth_layers=2)
+    off, ratio = compare(two, camera, path, hidden)
+    assert off.max() < 0.02 and (two.aov["solve_status"][hidden] == 8).all()
+    np.testing.assert_allclose(ratio, 1.0, rtol=2e-3)
+    assert not np.isin(one.aov["solve_status"][hidden], (1, 5)).any()
+
+
 def test_behind_another_surface() -> None:
     """The same block under absorbing water, the plate level in it."""
     parts = [
@@ -225,10 +250,10 @@ def test_behind_another_surface() -> None:
 
 
 def test_a_core_that_holds_a_plate_within_a_block() -> None:
-    """A plate in a solid within a solid; and one behind that, in the outer one."""
+    """A plate in a solid within a solid; one behind that in the outer one, and one before it."""
     dense = replace(GLASS, name="flint", ior=1.8, attenuation_color=(0.9, 0.5, 0.4), attenuation_distance_m=0.5)
     camera = Camera.look_at((0.9, 0.5, 3.0), (0.0, 0.0, -0.2), yfov_rad=0.3)
-    for plate_z in (-0.1, -0.7):
+    for plate_z in (-0.1, -0.7, 0.7):
         parts = [
             box("case", (4.0, 4.0, 2.0), (0.0, 0.0, 0.0), GREEN),
             box("core", (3.0, 3.0, 0.8), (0.0, 0.0, 0.0), dense),
@@ -238,13 +263,14 @@ def test_a_core_that_holds_a_plate_within_a_block() -> None:
         frame, path = look(scene_of(parts, [sun(0.0, 1e-3)], camera, sky=BLACK)), Path(camera)
         path.to_plane(Z, 1.0)
         path.refract(Z, 1.0, N_GLASS)
-        path.to_plane(Z, 0.4, GREEN.sigma_a)
-        path.refract(Z, N_GLASS, 1.8)
-        path.to_plane(Z, max(plate_z, -0.4), dense.sigma_a)
+        path.to_plane(Z, max(plate_z, 0.4), GREEN.sigma_a)
+        if plate_z < 0.4:
+            path.refract(Z, N_GLASS, 1.8)
+            path.to_plane(Z, max(plate_z, -0.4), dense.sigma_a)
         if plate_z < -0.4:
             path.refract(Z, 1.8, N_GLASS)
             path.to_plane(Z, plate_z, GREEN.sigma_a)
-        path.share = path.share / (1.8 if plate_z > -0.4 else N_GLASS) ** 2
+        path.share = path.share / (1.8 if abs(plate_z) < 0.4 else N_GLASS) ** 2
         off, ratio = compare(frame, camera, path, on_plate(path, -0.02))
         assert off.max() < 0.02
         np.testing.assert_allclose(ratio, 1.0, rtol=2e-3)
