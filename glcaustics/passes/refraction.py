@@ -88,9 +88,16 @@ def declare(graph: FrameGraph, setup: FrameSetup) -> None:
                 *specular_layers.states(setup),
             ),
             history=(REFLECTION_M,) if _seeds(setup) else (),
-            note=f"what water, glass and mirrors show; eye rays: {SOLVERS[solver]}{_eye_at_start(setup)}",
+            note=f"what water, glass and mirrors show; eye rays: {_solver_words(setup)}{_eye_at_start(setup)}",
         )
     )
+
+
+def _solver_words(setup: FrameSetup) -> str:
+    """For the plan's reader: how rays are followed, and whether those in solids are looked for in the opaque layer."""
+    solver = str(setup.options["refraction"])
+    searches = setup.opaque_inside and solver != "sousa"
+    return SOLVERS[solver] + ("; rays in solids end on what stands in them" if searches else "")
 
 
 def _eye_at_start(setup: FrameSetup) -> str:
