@@ -169,6 +169,14 @@ def pixel_noise(name: str, method: str, frame: Frame) -> float:
     return float(np.sqrt(flux_w / area_m2 / frame.aov["caustic_irradiance"].mean()))
 
 
+def rounded(irradiance: FloatArray) -> float:
+    """Relative RMSE of a picture that is moved by 1 / 4096 px: of float32's 24 bits a place among the map's 2520 texels
+    leaves 12 behind the point. It shows at the nephroid's cusp alone, where single pixels hold a hundred times the mean.
+    """
+    steps = np.gradient(irradiance, axis=(0, 1))
+    return float(np.sqrt(np.mean(steps[0] ** 2 + steps[1] ** 2)) / 4096.0 / irradiance.mean())
+
+
 @pytest.mark.parametrize("factor", [0.001, 1000.0])
 @pytest.mark.parametrize("method", NAMES)
 @pytest.mark.parametrize("name", ["sine-folds", "flat-point", "sphere-absorbing", "nephroid"])
@@ -179,8 +187,11 @@ def test_scale_changes_nothing(name: str, method: str, factor: float) -> None:
     ldr = np.sqrt(np.mean((frame.ldr.astype(np.float64) - other.ldr) ** 2)) / 255.0
     reference = frame.aov["caustic_irradiance"].astype(np.float64)
     caustic = relative_rmse(other.aov["caustic_irradiance"].astype(np.float64), reference)
-    print(f"{method} {name} x {factor:g}: RMSE {ldr:.2e} of the picture, {caustic:.2e} of the caustic")
+    place = rounded(reference)
+    print(
+        f"{method} {name} x {factor:g}: RMSE {ldr:.2e} of the picture, {caustic:.2e} of the caustic, place {place:.1e}"
+    )
     assert reference.mean() > 0.0
     rounding = ROUNDING_SHARE * pixel_noise(name, method, frame)
     assert ldr < 1e-3 + rounding
-    assert caustic < 1e-3 + rounding
+    assert caustic < 1e-3 + rounding + place
