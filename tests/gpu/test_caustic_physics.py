@@ -171,7 +171,7 @@ def pixel_noise(name: str, method: str, frame: Frame) -> float:
 
 def rounded(irradiance: FloatArray) -> float:
     """Relative RMSE of a picture that is moved by 1 / 4096 px: of float32's 24 bits a place among the map's 2520 texels
-    leaves 12 behind the point. It shows at the nephroid's cusp alone, where single pixels hold a hundred times the mean.
+    leaves 12 behind the point. It shows at the nephroid's cusp alone, where pixels hold a hundred times the mean.
     """
     steps = np.gradient(irradiance, axis=(0, 1))
     return float(np.sqrt(np.mean(steps[0] ** 2 + steps[1] ** 2)) / 4096.0 / irradiance.mean())
