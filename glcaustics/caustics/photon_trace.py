@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 from glcaustics.caustics import photon_options, photon_strata
 from glcaustics.caustics.branches import BRANCH_CODE, INTERFACE, REFLECT, Branch, branches_of
-from glcaustics.caustics.caustic_map import CausticMap
+from glcaustics.caustics.coarse_light import CoarseLight
 from glcaustics.caustics.landing import fit_layers
 from glcaustics.caustics.method import IRRADIANCE, NOISY_IRRADIANCE, CausticsMethod
 from glcaustics.caustics.photon_stats import landing_of, photon_statistics
@@ -64,7 +64,7 @@ class PhotonTrace(CausticsMethod):
         if OpticalKind.SOLID not in setup.kinds():
             return
         self._solids.receivers_inside = receivers_inside_solids(setup.instances())
-        solver = CausticMap()
+        solver = CoarseLight()
         solver.solids = self._solids
         solve_setup = replace(setup, options={**solver.defaults, **setup.options})
         for light in setup.lights:

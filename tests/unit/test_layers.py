@@ -86,10 +86,14 @@ def test_methods_do_not_know_each_other() -> None:
     "path", sorted(p for p in GLSL.rglob("*") if p.suffix in {".glsl", ".vert", ".frag", ".geom"}), ids=str
 )
 def test_shader_includes_go_one_way(path: Path) -> None:
-    """technique -> interface -> common; a technique may include files of its own folder."""
+    """technique -> interface -> common; a technique may include files of its own folder, a caustics method also what
+    the methods share.
+    """
     folder = path.relative_to(GLSL).parent.as_posix()
     allowed = {"common": ("common/",), "interface": ("interface/", "common/")}.get(
         folder.split("/")[0], (f"{folder}/", "interface/", "common/")
     )
+    if folder.startswith("caustics/"):
+        allowed += ("caustics/shared/",)
     for include in re.findall(r'^\s*#include\s+"([^"]+)"', path.read_text(), re.MULTILINE):
         assert include.startswith(allowed), f"{path.relative_to(GLSL)} must not include {include}"
