@@ -12,6 +12,7 @@ from glcaustics.passes import light_view
 from glcaustics.passes.context import PassContext
 from glcaustics.passes.frame import FrameSetup, LightSetup
 from glcaustics.passes.geometry import boxes_of
+from glcaustics.passes.solid_contents import reach_into, triangle_boxes
 from glcaustics.scene.model import Instance, OpticalKind
 
 ONE_PAIR, TWO_PAIRS = ("back",), ("back", "front2", "back2")
@@ -86,10 +87,9 @@ def receivers_inside_solids(everything: tuple[Instance, ...]) -> bool:
         return False
     for instance in everything:
         if instance.optical_kind is OpticalKind.DIFFUSE:
-            corners = instance.positions_ws()[instance.mesh.triangles]
-            low, high = corners.min(axis=1), corners.max(axis=1)
-            for box in boxes:
-                air = 1e-4 * (box[1] - box[0])  # what stands on a floor, or is cut from the same grid, touches
-                if ((low < box[1] - air) & (high > box[0] + air)).all(axis=1).any():
+            least, most = triangle_boxes(instance)
+            for low, high in boxes:
+                air = 1e-4 * (high - low)  # what stands on a floor, or is cut from the same grid, touches
+                if reach_into(least, most, low, high, air):
                     return True
     return False

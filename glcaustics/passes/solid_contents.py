@@ -33,10 +33,20 @@ def holds_opaque(instances: Sequence[Instance]) -> bool:
     return False
 
 
+def triangle_boxes(instance: Instance) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest corners (N, 3) of the boxes around an instance's triangles, metres, world space."""
+    corners = instance.positions_ws()[instance.mesh.triangles]
+    return corners.min(axis=1), corners.max(axis=1)
+
+
+def reach_into(least: FloatArray, most: FloatArray, low: FloatArray, high: FloatArray, air: FloatArray | float) -> bool:
+    """Whether a box of (N, 3) `least` to `most` reaches into the box `low` to `high` by more than `air`, metres."""
+    return bool(((least < high - air) & (most > low + air)).all(axis=1).any())
+
+
 def _contact(instance: Instance, low: FloatArray, high: FloatArray, air: float) -> tuple[bool, set[int]]:
     """Whether a triangle reaches into a box by more than `air`, metres; sides (0-2 low, 3-5 high) that some touch."""
-    corners = instance.positions_ws()[instance.mesh.triangles]
-    least, most = corners.min(axis=1), corners.max(axis=1)
+    least, most = triangle_boxes(instance)
     meets = np.all((least <= high + air) & (most >= low - air), axis=1)
     beside = np.concatenate((most[meets] <= low + air, least[meets] >= high - air), axis=1)
-    return bool(np.any(~beside.any(axis=1))), set(np.flatnonzero(beside.any(axis=0)).tolist())
+    return reach_into(least, most, low, high, air), set(np.flatnonzero(beside.any(axis=0)).tolist())

@@ -107,3 +107,13 @@ def grid_xz(half_m: float, pixels: int) -> tuple[FloatArray, FloatArray]:
 def relative_rmse(image: npt.ArrayLike, reference: npt.ArrayLike) -> float:
     a, b = np.asarray(image, np.float64), np.asarray(reference, np.float64)
     return float(np.sqrt(((a - b) ** 2).mean()) / b.mean())
+
+
+def eye_rays(camera: Camera, size: tuple[int, int]) -> FloatArray:
+    """Unit directions (H, W, 3) of the rays through the pixels' centres of a perspective camera, world space."""
+    x = ((np.arange(size[0]) + 0.5) / size[0] * 2 - 1) * size[0] / size[1]
+    y = 1 - (np.arange(size[1]) + 0.5) / size[1] * 2
+    tangent = math.tan(0.5 * camera.yfov_rad)
+    xx, yy = np.meshgrid(x * tangent, y * tangent)
+    d = np.stack((xx, yy, -np.ones_like(xx)), 2) @ camera.world_from_camera[:3, :3].T
+    return np.asarray(d / np.linalg.norm(d, axis=2, keepdims=True))

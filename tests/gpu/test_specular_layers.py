@@ -14,7 +14,19 @@ from glcaustics.optics.fresnel import transmittance_dielectric
 from glcaustics.renderer import Frame, plan_frame
 from glcaustics.scene.model import Camera, Instance, Material, Scene, Sky
 from glcaustics.scene.transform import scaled
-from tests.gpu.feature_scenes import GLASS, MIRROR, WATER, box, plane, scene_of, sheet, shoot, sun, translation
+from tests.gpu.feature_scenes import (
+    GLASS,
+    MIRROR,
+    WATER,
+    box,
+    eye_rays,
+    plane,
+    scene_of,
+    sheet,
+    shoot,
+    sun,
+    translation,
+)
 from tests.gpu.physics_meshes import height_sheet, icosphere
 
 pytestmark = pytest.mark.gpu
@@ -34,16 +46,6 @@ def look(scene: Scene, **options: object) -> Frame:
     return shoot(scene, SIZE, method="none", specular_view=True, aovs=aovs, options=options)
 
 
-def rays(camera: Camera) -> FloatArray:
-    """Unit directions (H, W, 3) of the pixels' centres, world space."""
-    x = ((np.arange(SIZE[0]) + 0.5) / SIZE[0] * 2 - 1) * SIZE[0] / SIZE[1]
-    y = 1 - (np.arange(SIZE[1]) + 0.5) / SIZE[1] * 2
-    tangent = math.tan(0.5 * camera.yfov_rad)
-    xx, yy = np.meshgrid(x * tangent, y * tangent)
-    d = np.stack((xx, yy, -np.ones_like(xx)), 2) @ camera.world_from_camera[:3, :3].T
-    return np.asarray(d / np.linalg.norm(d, axis=2, keepdims=True))
-
-
 def project(camera: Camera, p: FloatArray) -> FloatArray:
     """Pixels (..., 2) of points, origin at the bottom left."""
     q = (p - camera.position_ws) @ camera.world_from_camera[:3, :3]
@@ -55,7 +57,7 @@ class Path:
     """Rays that are followed through surfaces one after the other; `share` is what they carry to the eye."""
 
     def __init__(self, camera: Camera) -> None:
-        self.d = rays(camera)
+        self.d = eye_rays(camera, SIZE)
         self.p = np.broadcast_to(camera.position_ws, self.d.shape)
         self.share: FloatArray = np.ones(self.d.shape)
         self.alive: BoolArray = np.ones(self.d.shape[:2], bool)
@@ -312,7 +314,7 @@ def test_a_mirror_at_the_bottom_shows_the_sky() -> None:
     path.reflect(Y)
     path.to_plane(Y, 0.0, SEA.sigma_a)
     path.refract(Y, N_WATER, 1.0)
-    reflected = 1.0 - transmittance_dielectric(-rays(camera)[..., 1:2], 1.0, N_WATER)
+    reflected = 1.0 - transmittance_dielectric(-eye_rays(camera, SIZE)[..., 1:2], 1.0, N_WATER)
     truth = (path.share + reflected) * np.array(sky.zenith)
     assert shown.mean() > 0.9
     np.testing.assert_allclose(frame.image[shown], truth[shown], rtol=5e-3)

@@ -11,7 +11,19 @@ import pytest
 from glcaustics.optics.fresnel import transmittance_dielectric
 from glcaustics.renderer import Frame
 from glcaustics.scene.model import Camera, Instance, Material, Scene, Sky
-from tests.gpu.feature_scenes import GLASS, MIRROR, WATER, box, plane, scene_of, sheet, shoot, sun, translation
+from tests.gpu.feature_scenes import (
+    GLASS,
+    MIRROR,
+    WATER,
+    box,
+    eye_rays,
+    plane,
+    scene_of,
+    sheet,
+    shoot,
+    sun,
+    translation,
+)
 from tests.gpu.physics_meshes import icosphere
 
 pytestmark = pytest.mark.gpu
@@ -20,16 +32,6 @@ SEA = replace(WATER, attenuation_color=(0.2, 0.6, 0.8), attenuation_distance_m=2
 GREY = Material("grey", base_color=(0.5, 0.5, 0.5))
 SKY = Sky(zenith=(3.0, 4.0, 5.0), horizon=(3.0, 4.0, 5.0), ground=(0.0, 0.0, 0.0))
 SIZE = (96, 64)
-
-
-def rays(camera: Camera, size: tuple[int, int] = SIZE) -> np.ndarray:
-    """Unit directions (H, W, 3) of the pixels' centres, world space."""
-    x = ((np.arange(size[0]) + 0.5) / size[0] * 2 - 1) * size[0] / size[1]
-    y = 1 - (np.arange(size[1]) + 0.5) / size[1] * 2
-    tangent = math.tan(0.5 * camera.yfov_rad)
-    xx, yy = np.meshgrid(x * tangent, y * tangent)
-    d = np.stack((xx, yy, -np.ones_like(xx)), 2) @ camera.world_from_camera[:3, :3].T
-    return np.asarray(d / np.linalg.norm(d, axis=2, keepdims=True))
 
 
 def look(scene: Scene, aovs: tuple[str, ...] = ("solve_status",), **more: object) -> Frame:
@@ -57,7 +59,7 @@ def test_a_floor_seen_directly_is_absorbed_and_its_caustics_are_not() -> None:
     """L = L_floor exp(-sigma d) with d from the eye to the floor; E_c is the floor's, as without the water's view."""
     scene = pool((0.0, -0.5, 0.0), (0.3, -2.0, 0.4))
     frame = look(scene, ("caustic_irradiance", "solve_status"))
-    down = rays(scene.camera)
+    down = eye_rays(scene.camera, SIZE)
     distance = -1.5 / down[..., 1:2]
     expected = floor_radiance() * np.exp(-SEA.sigma_a * distance)
     assert (frame.aov["solve_status"] == 0).all()
@@ -74,7 +76,7 @@ def test_snells_window_and_the_mirror_around_it() -> None:
     image, absorbed on both its ways. The rim lies where it must within a pixel."""
     scene = pool((0.0, -0.5, 0.0), (0.0, -0.5, -1.0), fov=2.2)
     frame = look(scene)
-    image, status, d = frame.image.astype(np.float64), frame.aov["solve_status"], rays(scene.camera)
+    image, status, d = frame.image.astype(np.float64), frame.aov["solve_status"], eye_rays(scene.camera, SIZE)
     up = d[..., 1] > 0.02
     cos_i = np.where(up, d[..., 1], 1.0)
     sin_out = N * np.sqrt(1.0 - cos_i**2)
@@ -103,7 +105,7 @@ def test_what_stands_outside_is_right_side_up_in_the_window() -> None:
     low = box("low", (8.0, 1.0, 0.2), (0.0, 1.5, -3.0), green)
     scene = pool((0.0, -0.4, 0.0), (0.0, 0.6, -1.0), high, low, fov=1.3)
     frame = look(scene)
-    d = rays(scene.camera)
+    d = eye_rays(scene.camera, SIZE)
     at = np.array([0.0, -0.4, 0.0]) + d * (0.4 / np.maximum(d[..., 1:2], 1e-3))
     side = N * d[..., [0, 2]]
     out_y = np.sqrt(np.maximum(1.0 - (side**2).sum(axis=2), 0.0))
@@ -122,7 +124,7 @@ def test_a_mirror_under_water_is_absorbed_on_both_ways() -> None:
     """An upright mirror shows the floor as far away as the way over the mirror is."""
     mirror = box("mirror", (8.0, 4.0, 0.2), (0.0, -2.0, -2.1), MIRROR)
     scene = pool((0.0, -1.0, 0.0), (0.0, -1.7, -1.0), mirror, fov=1.5)
-    frame, d = look(scene), rays(scene.camera)
+    frame, d = look(scene), eye_rays(scene.camera, SIZE)
     virtual = d * (1.0 / np.maximum(-d[..., 1:2], 1e-3))  # where the ray would meet the floor without the mirror
     shows = (virtual[..., 2] < -2.2) & (virtual[..., 2] > -3.5) & (np.abs(virtual[..., 0]) < 1.0)
     expected = floor_radiance() * np.exp(-SEA.sigma_a * np.linalg.norm(virtual, axis=2)[..., None])
@@ -151,7 +153,7 @@ def test_inside_a_block_of_glass() -> None:
         [sun(0.0, 1.0)],
         Camera.look_at((0.0, 0.0, 0.2), (0.0, 0.0, -1.0), yfov_rad=0.9),
     )
-    frame, cos_i = look(scene), -rays(scene.camera)[..., 2]
+    frame, cos_i = look(scene), -eye_rays(scene.camera, SIZE)[..., 2]
     inside = 1.5 * np.sqrt(1.0 - cos_i**2) < 0.9
     expected = 1.5**2 * 5.0 * transmittance_dielectric(cos_i, 1.5, 1.0)[..., None]
     expected = expected * np.exp(-glass.sigma_a * (1.2 / cos_i)[..., None])
